@@ -1,0 +1,254 @@
+"""A measured data set: commanded joints and where the probe really was. Columns, units and checks of the design."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from truepath import lie
+from truepath.errors import InputError
+from truepath.lie import Array
+from truepath.robot import NominalRobot
+from truepath.tables import Table
+
+ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180.0}
+LENGTH_UNITS = {"mm": 1e-3, "m": 1.0}
+OTHER_UNITS = {"t": "s", "temperature": "c", "payload": "kg"}
+QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
+QUATERNION_NORM_TOLERANCE = 1e-3
+LIMIT_TOLERANCE_RAD = np.radians(2.0)
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """N measured poses in the order of measurement, SI units.
+
+    Frames: M measurement frame (tracker or cell), B robot base, F flange, E probe or reflector.
+
+    Attributes:
+        q_rad: ``(N, n)`` commanded joint angles.
+        p_ME: ``(N, 3)`` measured position of the probe, m.
+        R_ME: ``(N, 3, 3)`` measured orientation, None for a mere reflector.
+        time_s, temperature_c, payload_kg: ``(N,)`` context or None.
+        approach: ``(N, n)`` in {-1, 0, 1}, direction in which each joint arrived, or None.
+        pose_id: ``(N,)`` group number, equal for repeated visits of one pose, or None.
+        line: ``(N,)`` line of each pose in its file.
+        X_MB_nominal, X_FE_nominal: ``(4, 4)`` where base and probe are meant to be, None where nobody knows.
+        source, sha256: file name and hash of its bytes.
+    """
+
+    q_rad: Array
+    p_ME: Array
+    R_ME: Array | None = None
+    time_s: Array | None = None
+    temperature_c: Array | None = None
+    payload_kg: Array | None = None
+    approach: Array | None = None
+    pose_id: Array | None = None
+    line: Array = field(default_factory=lambda: np.zeros(0, int))
+    X_MB_nominal: Array | None = None
+    X_FE_nominal: Array | None = None
+    source: str = "memory"
+    sha256: str = ""
+
+    def __post_init__(self) -> None:
+        if len(self.line) != len(self.q_rad):
+            object.__setattr__(self, "line", np.arange(len(self.q_rad)) + 2)
+        if not self.sha256:
+            content = self.q_rad.tobytes() + self.p_ME.tobytes()
+            object.__setattr__(self, "sha256", hashlib.sha256(content).hexdigest())
+
+    def __len__(self) -> int:
+        return len(self.q_rad)
+
+    @property
+    def has_orientation(self) -> bool:
+        return self.R_ME is not None
+
+    def subset(self, rows: Array) -> Measurements:
+        """The poses picked by an index or boolean array, in that order."""
+        per_pose = ("q_rad", "p_ME", "R_ME", "time_s", "temperature_c", "payload_kg", "approach", "pose_id", "line")
+        parts = {name: getattr(self, name) for name in per_pose}
+        return replace(self, **{name: None if part is None else part[rows] for name, part in parts.items()})
+
+    def groups(self) -> Array:
+        """``(N,)`` group number of each pose, counted from 0: repeated visits of one pose share it."""
+        if self.pose_id is None:
+            return np.arange(len(self))
+        return np.unique(self.pose_id, return_inverse=True)[1]
+
+    def folds(self, count: int, seed: int = 0) -> list[Array]:
+        """Row numbers of ``count`` random parts of nearly equal size; visits of one pose stay together."""
+        groups = self.groups()
+        order = np.random.default_rng(seed).permutation(groups.max() + 1)
+        part_of_group = np.empty(len(order), int)
+        part_of_group[order] = np.arange(len(order)) % count
+        return [np.flatnonzero(part_of_group[groups] == k) for k in range(count)]
+
+
+def from_table(table: Table, num_joints: int) -> Measurements:
+    """The truepath CSV of the design document.
+
+    Raises:
+        InputError: every fault of a file, with line and column.
+    """
+    _check_units(table, num_joints)
+    q_names, q_factor = _unit_columns(table, [f"q{i + 1}" for i in range(num_joints)], ANGLE_UNITS)
+    p_names, p_factor = _unit_columns(table, ["x", "y", "z"], LENGTH_UNITS)
+    R_ME = None
+    if any(name in table.header for name in QUATERNION_COLUMNS):
+        table.require(QUATERNION_COLUMNS)
+        R_ME = lie.from_quaternion(unit_quaternions(table, QUATERNION_COLUMNS))
+    approach = None
+    approach_names = [f"approach{i + 1}" for i in range(num_joints)]
+    if any(name in table.header for name in approach_names):
+        table.require(approach_names)
+        approach = table.numbers(approach_names)
+        _reject(table, ~np.isin(approach, (-1, 0, 1)), approach_names, "not a direction of arrival", "-1, 0 or 1")
+    time_s = _optional(table, "t_s")
+    if time_s is not None and np.any(np.diff(time_s) < 0):
+        k = int(np.argmax(np.diff(time_s) < 0)) + 1
+        raise InputError(
+            "time runs backwards",
+            file=table.file,
+            line=int(table.lines[k]),
+            column="t_s",
+            expected=f"rows in the order of measurement, {time_s[k - 1]} or later",
+            found=str(time_s[k]),
+        )
+    pose_id = None
+    if "pose_id" in table.header:
+        pose_id = np.unique(table.text("pose_id"), return_inverse=True)[1]
+    return Measurements(
+        q_rad=table.numbers(q_names) * q_factor,
+        p_ME=table.numbers(p_names) * p_factor,
+        R_ME=R_ME,
+        time_s=time_s,
+        temperature_c=_optional(table, "temperature_c"),
+        payload_kg=_optional(table, "payload_kg"),
+        approach=approach,
+        pose_id=pose_id,
+        line=table.lines,
+        source=table.file.name,
+        sha256=hashlib.sha256(table.raw).hexdigest(),
+    )
+
+
+def check_joint_limits(measurements: Measurements, robot: NominalRobot, file: str | Path) -> None:
+    """Raises InputError for a pose that the robot cannot have taken; recognises degrees read as radians."""
+    q = measurements.q_rad
+    if q.shape[1] != robot.num_joints:
+        raise InputError(
+            f"the data has {q.shape[1]} joints", file=file, expected=f"{robot.num_joints} joints of {robot.name}"
+        )
+    beyond = (q < robot.lower_rad - LIMIT_TOLERANCE_RAD) | (q > robot.upper_rad + LIMIT_TOLERANCE_RAD)
+    if not beyond.any():
+        return
+    k, i = np.argwhere(beyond)[0]
+    fits_as_degrees = np.all(
+        (np.radians(q) >= robot.lower_rad - LIMIT_TOLERANCE_RAD)
+        & (np.radians(q) <= robot.upper_rad + LIMIT_TOLERANCE_RAD)
+    )
+    hint = " (all angles would fit as degrees: were degrees written into a column of radians?)"
+    raise InputError(
+        "an angle lies far beyond the joint limits",
+        file=file,
+        line=int(measurements.line[k]),
+        column=f"q{i + 1} ({robot.joint_names[i]})",
+        expected=f"{robot.lower_rad[i]:.4f} to {robot.upper_rad[i]:.4f} rad",
+        found=f"{q[k, i]:.4f} rad" + (hint if fits_as_degrees else ""),
+    )
+
+
+def unit_quaternions(table: Table, names: Sequence[str]) -> Array:
+    """``(N, 4)`` normalised quaternions; raises InputError for one whose length is not 1."""
+    quaternion = table.numbers(names)
+    length = np.linalg.norm(quaternion, axis=1)
+    bad = np.abs(length - 1.0) > QUATERNION_NORM_TOLERANCE
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise InputError(
+            "the quaternion is not of unit length",
+            file=table.file,
+            line=int(table.lines[k]),
+            column=", ".join(names),
+            expected=f"length 1 within {QUATERNION_NORM_TOLERANCE}",
+            found=f"{length[k]:.6f}",
+        )
+    return quaternion / length[:, None]
+
+
+def _check_units(table: Table, num_joints: int) -> None:
+    """Every name of the vocabulary that carries an unknown unit, or a joint that the robot does not have."""
+    for name in table.header:
+        match = re.fullmatch(r"(q\d+|x|y|z|t|temperature|payload)_([A-Za-z]+)", name)
+        if not match:
+            continue
+        quantity, unit = match.groups()
+        if quantity in OTHER_UNITS:
+            known = [OTHER_UNITS[quantity]]
+        else:
+            known = list(ANGLE_UNITS if quantity[0] == "q" else LENGTH_UNITS)
+        if unit not in known:
+            raise InputError(
+                f"unknown unit {unit!r}",
+                file=table.file,
+                line=1,
+                column=name,
+                expected=" or ".join(f"{quantity}_{u}" for u in known),
+                found=name,
+            )
+        if quantity[0] == "q" and not 1 <= int(quantity[1:]) <= num_joints:
+            raise InputError(
+                "a column for a joint that the robot does not have",
+                file=table.file,
+                line=1,
+                column=name,
+                expected=f"q1 to q{num_joints}",
+            )
+
+
+def _unit_columns(table: Table, quantities: list[str], units: dict[str, float]) -> tuple[list[str], float]:
+    """Names of the columns of all quantities, in one common unit, and the factor to SI."""
+    for quantity in quantities:
+        present = [f"{quantity}_{unit}" for unit in units if f"{quantity}_{unit}" in table.header]
+        if len(present) > 1:
+            raise InputError(
+                "a quantity appears in two units",
+                file=table.file,
+                line=1,
+                column=present[1],
+                expected="one column",
+                found=" and ".join(present),
+            )
+    found = [u for u in units if any(f"{quantity}_{u}" in table.header for quantity in quantities)]
+    if len(found) > 1:
+        raise InputError(
+            "the units of " + ", ".join(quantities) + " differ",
+            file=table.file,
+            line=1,
+            expected="one unit for all",
+            found=" and ".join(found),
+        )
+    unit = found[0] if found else next(iter(units))
+    names = [f"{quantity}_{unit}" for quantity in quantities]
+    table.require(names)
+    return names, units[unit]
+
+
+def _optional(table: Table, name: str) -> Array | None:
+    return table.numbers([name])[:, 0] if name in table.header else None
+
+
+def _reject(table: Table, bad: Array, names: Sequence[str], problem: str, expected: str) -> None:
+    if bad.any():
+        k, i = np.argwhere(bad)[0]
+        found = table.text(names[i])[k]
+        raise InputError(
+            problem, file=table.file, line=int(table.lines[k]), column=names[i], expected=expected, found=found
+        )

@@ -1,0 +1,105 @@
+"""Finding a robot: a built-in name, a URDF or a Drake directives file becomes a finalized plant."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from truepath.errors import InputError
+from truepath.robot import NominalRobot, read_robot
+
+if TYPE_CHECKING:
+    from pydrake.geometry import SceneGraph
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.systems.framework import DiagramBuilder
+
+BUILT_IN = ("ur5", "ur10")
+
+
+def models_dir() -> Path:
+    """The folder ``models``: inside an installed package, or beside ``plugin`` in a checkout."""
+    installed = Path(__file__).parent / "models"
+    return installed if installed.is_dir() else Path(__file__).parents[2] / "models"
+
+
+def resolve(spec: str | Path) -> Path:
+    """The file behind a built-in name or a path.
+
+    Raises:
+        InputError: neither a built-in name nor an existing ``.urdf`` or ``.dmd.yaml`` file.
+    """
+    if str(spec) in BUILT_IN:
+        return models_dir() / str(spec) / f"{spec}.urdf"
+    path = Path(spec)
+    if not path.is_file() or not path.name.endswith((".urdf", ".dmd.yaml")):
+        raise InputError(
+            f"no robot {str(spec)!r}",
+            expected=f"a built-in name ({', '.join(BUILT_IN)}) or an existing .urdf or .dmd.yaml file",
+            found="no such file" if not path.exists() else "a file of another kind",
+        )
+    return path
+
+
+def cell_of(spec: str | Path) -> Path:
+    """The directives of the whole cell: for a built-in name the cell that comes with it, else the file itself."""
+    return models_dir() / str(spec) / "cell.dmd.yaml" if str(spec) in BUILT_IN else resolve(spec)
+
+
+def make_parser(plant: MultibodyPlant) -> Parser:
+    """A Drake parser that knows ``package://truepath_models``."""
+    from pydrake.multibody.parsing import Parser
+
+    parser = Parser(plant)
+    parser.package_map().Add("truepath_models", str(models_dir()))
+    return parser
+
+
+def add_model(plant: MultibodyPlant, spec: str | Path) -> None:
+    """Adds a robot or a cell to a plant that is not finalized yet. A free base is welded to the world.
+
+    Raises:
+        InputError: Drake cannot read the file; its own words are passed on.
+    """
+    path = resolve(spec)
+    try:
+        added = make_parser(plant).AddModels(str(path))
+    except (RuntimeError, ValueError) as error:
+        raise InputError("Drake cannot read this model", file=path, found=str(error)) from error
+    if path.suffix == ".urdf":
+        base = plant.get_body(plant.GetBodyIndices(added[0])[0])
+        children = {int(plant.get_joint(i).child_body().index()) for i in plant.GetJointIndices(added[0])}
+        if int(base.index()) not in children:
+            plant.WeldFrames(plant.world_frame(), base.body_frame())
+
+
+def add_cell(builder: DiagramBuilder, spec: str | Path) -> tuple[MultibodyPlant, SceneGraph]:
+    """Adds a finalized plant with a scene graph to a diagram under construction."""
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    add_model(plant, spec)
+    plant.Finalize()
+    return plant, scene_graph
+
+
+def load_plant(spec: str | Path) -> MultibodyPlant:
+    """A finalized plant, without geometry."""
+    from pydrake.multibody.plant import MultibodyPlant
+
+    plant = MultibodyPlant(time_step=0.0)
+    add_model(plant, spec)
+    plant.Finalize()
+    return plant
+
+
+@lru_cache(maxsize=8)
+def _load_robot(path: Path, changed_ns: int) -> NominalRobot:
+    return read_robot(load_plant(path))
+
+
+def load_robot(spec: str | Path) -> NominalRobot:
+    """The nominal robot behind a built-in name, a URDF or a directives file; read once per process."""
+    path = resolve(spec).resolve()
+    return _load_robot(path, path.stat().st_mtime_ns)

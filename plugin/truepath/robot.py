@@ -1,0 +1,303 @@
+"""The nominal robot, read from a Drake plant. The one module that reads a ``MultibodyPlant``.
+
+Frames: W world, B robot base, Ai axis i (z along the joint axis), F flange. All quantities are taken
+at the zero configuration and expressed in B unless the name says otherwise.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truepath import lie
+from truepath.errors import InputError
+from truepath.lie import Array
+
+if TYPE_CHECKING:
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import Frame, ModelInstanceIndex, RevoluteJoint
+
+FLANGE_NAMES = ("flange", "tool0", "ee_link", "tool_flange")
+
+
+@dataclass(frozen=True, eq=False)
+class NominalRobot:
+    """A serial arm of n revolute joints as its maker drew it.
+
+    Attributes:
+        name: name of the model, as in the URDF.
+        joint_names: n names, base to flange.
+        X_BA: ``(n, 4, 4)`` axis frames at zero configuration. z is the joint axis; the origin is that of
+            the joint; x is the base axis that is most nearly perpendicular to z, made perpendicular.
+        X_BF: ``(4, 4)`` zero pose of the flange (M of the product of exponentials).
+        lower_rad, upper_rad, velocity_rad_s, acceleration_rad_s2: ``(n,)`` limits, infinite where the model has none.
+        link_mass_kg: ``(n,)`` mass that joint i carries before joint i+1 (tool and reflector with the last).
+        p_BoLcm_B: ``(n, 3)`` centre of that mass at the zero configuration, m.
+        gravity_B: ``(3,)`` acceleration of gravity in the base frame, m/s^2.
+        X_WB: ``(4, 4)`` where the model places the base in its world.
+        X_FR: ``(4, 4)`` pose of the frame named ``reflector`` on the flange, None if the model has none.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    X_BA: Array
+    X_BF: Array
+    lower_rad: Array
+    upper_rad: Array
+    velocity_rad_s: Array
+    acceleration_rad_s2: Array
+    link_mass_kg: Array
+    p_BoLcm_B: Array
+    gravity_B: Array
+    X_WB: Array = field(default_factory=lambda: np.eye(4))
+    X_FR: Array | None = None
+
+    @property
+    def num_joints(self) -> int:
+        return len(self.joint_names)
+
+    @property
+    def screws_B(self) -> Array:
+        """``(n, 6)`` screws xi = (omega, -omega x q) at zero configuration (Jiang et al. 2020, eq. 2 to 4)."""
+        omega, point = self.X_BA[:, :3, 2], self.X_BA[:, :3, 3]
+        return np.concatenate([omega, -np.cross(omega, point)], axis=1)
+
+    @property
+    def model_sha256(self) -> str:
+        """Hash of the nominal kinematics, to the nanometre; limits, masses and the place in the world do not enter."""
+        rounded = [
+            (np.round(part, 9) + 0.0).tolist()  # + 0.0 turns -0.0 into 0.0
+            for part in (self.screws_B, self.X_BF)
+        ]
+        text = json.dumps({"joints": list(self.joint_names), "screws": rounded[0], "zero_pose": rounded[1]})
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def gravity_torque(
+        self, q_rad: Array, payload_kg: Array | float = 0.0, p_FP: Array | None = None
+    ) -> Array:
+        """Torque that gravity exerts about each joint axis, N m.
+
+        Args:
+            q_rad: ``(N, n)`` joint angles.
+            payload_kg: scalar or ``(N,)`` point mass on the flange, beyond what the model carries.
+            p_FP: ``(3,)`` where that mass sits in the flange frame, m; the flange origin if None.
+
+        Returns:
+            ``(N, n)``. Same sign as Drake's ``CalcGravityGeneralizedForces``.
+        """
+        q_rad = np.atleast_2d(q_rad)
+        payload = np.broadcast_to(np.asarray(payload_kg, float), q_rad.shape[:1])
+        omega_0, point_0 = self.X_BA[:, :3, 2], self.X_BA[:, :3, 3]
+        payload_0 = self.X_BF[:3, 3] if p_FP is None else self.X_BF[:3, :3] @ p_FP + self.X_BF[:3, 3]
+        X = np.broadcast_to(np.eye(4), (len(q_rad), 4, 4))
+        axes, points, centres = [], [], []
+        for i in range(self.num_joints):
+            axes.append(X[:, :3, :3] @ omega_0[i])
+            points.append(X[:, :3, :3] @ point_0[i] + X[:, :3, 3])
+            X = X @ rotation_about_axis(self.X_BA[i], q_rad[:, i])
+            centres.append(X[:, :3, :3] @ self.p_BoLcm_B[i] + X[:, :3, 3])
+        payload_B = X[:, :3, :3] @ payload_0 + X[:, :3, 3]
+        # Mass and first moment of everything outboard of joint i, then tau_i = omega_i . (r x m g).
+        mass = np.broadcast_to(self.link_mass_kg, q_rad.shape).copy()
+        moment = mass[..., None] * np.stack(centres, axis=1)
+        mass[:, -1] += payload
+        moment[:, -1] += payload[:, None] * payload_B
+        mass = np.cumsum(mass[:, ::-1], axis=1)[:, ::-1]
+        moment = np.cumsum(moment[:, ::-1], axis=1)[:, ::-1]
+        arm = moment - mass[..., None] * np.stack(points, axis=1)
+        return np.einsum("kij,kij->ki", np.stack(axes, axis=1), np.cross(arm, self.gravity_B))
+
+
+def rotation_about_axis(X_BA: Array, angle_rad: Array) -> Array:
+    """exp(xi phi) of Jiang et al. 2020, eq. 5: ``(N, 4, 4)`` for the axis frame ``(4, 4)`` and angles ``(N,)``."""
+    rotation = lie.from_rotation_vector(np.multiply.outer(angle_rad, X_BA[:3, 2]))
+    point = X_BA[:3, 3]
+    return lie.make_pose(rotation, point - rotation @ point)
+
+
+def read_robot(
+    plant: MultibodyPlant,
+    *,
+    model_instance: ModelInstanceIndex | None = None,
+    base_frame: str | None = None,
+    flange_frame: str | None = None,
+) -> NominalRobot:
+    """Reads a serial arm of revolute joints out of a finalized plant.
+
+    Args:
+        plant: finalized; anything else may live in it.
+        model_instance: where the arm is; found by itself when exactly one instance has revolute joints.
+        base_frame, flange_frame: names; by default the instance's first body, and the end of the chain
+            (a frame called flange, tool0, ee_link or tool_flange, else the last body).
+
+    Raises:
+        InputError: plant not finalized, no arm or several, a joint of another type in the chain.
+    """
+    if not plant.is_finalized():
+        raise InputError("the plant is not finalized", expected="call plant.Finalize() first")
+    instance = _find_instance(plant) if model_instance is None else model_instance
+    base = _named_frame(plant, base_frame, instance) or _first_body_frame(plant, instance)
+    flange = _named_frame(plant, flange_frame, instance) or _find_flange(plant, instance)
+    joints = _chain(plant, base, flange)
+
+    context = plant.CreateDefaultContext()
+    for joint in joints:
+        joint.set_angle(context, 0.0)
+    X_WB = base.CalcPoseInWorld(context).GetAsMatrix4()
+    X_BW = lie.invert(X_WB)
+    mass, centre = _carried_masses(plant, context, joints)
+    p_BoLcm = centre @ X_BW[:3, :3].T + X_BW[:3, 3]
+    X_BF = X_BW @ flange.CalcPoseInWorld(context).GetAsMatrix4()
+    reflector = _find_reflector(plant, context, flange, joints[-1])
+    return NominalRobot(
+        name=plant.GetModelInstanceName(instance),
+        joint_names=tuple(joint.name() for joint in joints),
+        X_BA=np.stack([_axis_frame(joint, context, X_BW) for joint in joints]),
+        X_BF=X_BF,
+        lower_rad=np.array([joint.position_lower_limits()[0] for joint in joints]),
+        upper_rad=np.array([joint.position_upper_limits()[0] for joint in joints]),
+        velocity_rad_s=np.array([joint.velocity_upper_limits()[0] for joint in joints]),
+        acceleration_rad_s2=np.array([joint.acceleration_upper_limits()[0] for joint in joints]),
+        link_mass_kg=mass,
+        p_BoLcm_B=p_BoLcm,
+        gravity_B=X_BW[:3, :3] @ plant.gravity_field().gravity_vector(),
+        X_WB=X_WB,
+        X_FR=reflector,
+    )
+
+
+def chain_joints(plant: MultibodyPlant, robot: NominalRobot, instance: ModelInstanceIndex) -> list[RevoluteJoint]:
+    """The plant's joints that belong to a robot that was read from it, base to flange."""
+    return [plant.GetJointByName(name, instance) for name in robot.joint_names]
+
+
+def _find_instance(plant: MultibodyPlant) -> ModelInstanceIndex:
+    counts: dict[int, int] = {}
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        if joint.type_name() == "revolute":
+            instance = int(joint.model_instance())
+            counts[instance] = counts.get(instance, 0) + 1
+    from pydrake.multibody.tree import ModelInstanceIndex
+
+    names = [plant.GetModelInstanceName(ModelInstanceIndex(i)) for i in counts]
+    if len(counts) != 1:
+        raise InputError(
+            "cannot tell which model in the plant is the arm",
+            expected="exactly one model instance with revolute joints, or model_instance given",
+            found=", ".join(names) or "no revolute joint",
+        )
+    return ModelInstanceIndex(next(iter(counts)))
+
+
+def _named_frame(plant: MultibodyPlant, name: str | None, instance: ModelInstanceIndex) -> Frame | None:
+    if name is None:
+        return None
+    for where in ((instance,), ()):
+        if plant.HasFrameNamed(name, *where):
+            return plant.GetFrameByName(name, *where)
+    known = [plant.get_frame(i).name() for i in plant.GetFrameIndices(instance)]
+    raise InputError(f"no frame called {name!r} in the plant", expected="one of " + ", ".join(filter(None, known)))
+
+
+def _first_body_frame(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame:
+    return plant.get_body(plant.GetBodyIndices(instance)[0]).body_frame()
+
+
+def _find_flange(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame:
+    for name in FLANGE_NAMES:
+        if plant.HasFrameNamed(name, instance):
+            return plant.GetFrameByName(name, instance)
+    parents = {int(plant.get_joint(i).parent_body().index()) for i in plant.GetJointIndices(instance)}
+    bodies = plant.GetBodyIndices(instance)
+    leaves = [plant.get_body(b) for b in bodies if int(b) not in parents]
+    if len(leaves) != 1:
+        raise InputError(
+            "cannot tell which body carries the tool",
+            expected="a frame called " + ", ".join(FLANGE_NAMES) + ", a single end of the chain, or flange_frame given",
+            found=", ".join(body.name() for body in leaves),
+        )
+    return leaves[0].body_frame()
+
+
+def _inboard(plant: MultibodyPlant) -> dict[int, int]:
+    """For each body (by index) the joint (by index) that connects it towards the world."""
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    return {int(joint.child_body().index()): int(joint.index()) for joint in joints}
+
+
+def _chain(plant: MultibodyPlant, base: Frame, flange: Frame) -> list[RevoluteJoint]:
+    from pydrake.multibody.tree import JointIndex
+
+    inboard, chain = _inboard(plant), []
+    body = flange.body()
+    while body.index() != base.body().index():
+        if int(body.index()) not in inboard:
+            raise InputError(f"frame {flange.name()!r} does not hang on frame {base.name()!r}")
+        joint = plant.get_joint(JointIndex(inboard[int(body.index())]))
+        if joint.type_name() == "revolute":
+            chain.append(joint)
+        elif joint.type_name() != "weld":
+            raise InputError(
+                f"joint {joint.name()!r} is of a type that truepath does not calibrate",
+                expected="revolute (or weld) joints between base and flange",
+                found=joint.type_name(),
+            )
+        body = joint.parent_body()
+    if len(chain) < 2:
+        raise InputError("the chain from base to flange is no arm", expected="two revolute joints or more")
+    return chain[::-1]
+
+
+def _axis_frame(joint: RevoluteJoint, context: object, X_BW: Array) -> Array:
+    X_BJ = X_BW @ joint.frame_on_parent().CalcPoseInWorld(context).GetAsMatrix4()
+    z = X_BJ[:3, :3] @ joint.revolute_axis()
+    z = z / np.linalg.norm(z)
+    helper = np.eye(3)[np.argmin(np.round(np.abs(z), 6))]  # rounded: noise must not choose between equals
+    x = helper - z * (helper @ z)
+    x = x / np.linalg.norm(x)
+    return lie.make_pose(np.stack([x, np.cross(z, x), z], axis=1), X_BJ[:3, 3])
+
+
+def _carried_masses(plant: MultibodyPlant, context: object, joints: list[RevoluteJoint]) -> tuple[Array, Array]:
+    """Mass ``(n,)`` and its centre in the world ``(n, 3)``, grouped by the last chain joint inboard of each body."""
+    from pydrake.multibody.tree import BodyIndex, JointIndex
+
+    inboard = _inboard(plant)
+    position = {int(joint.index()): i for i, joint in enumerate(joints)}
+    mass, moment = np.zeros(len(joints)), np.zeros((len(joints), 3))
+    for b in range(1, plant.num_bodies()):
+        body = walker = plant.get_body(BodyIndex(b))
+        while (j := inboard.get(int(walker.index()))) is not None and j not in position:
+            walker = plant.get_joint(JointIndex(j)).parent_body()
+        if j is None:
+            continue
+        m = body.get_mass(context)
+        if not m > 0:
+            continue
+        X_WBody = body.EvalPoseInWorld(context)
+        mass[position[j]] += m
+        moment[position[j]] += m * (X_WBody @ body.CalcCenterOfMassInBodyFrame(context))
+    centre = np.divide(moment, mass[:, None], out=np.zeros_like(moment), where=mass[:, None] > 0)
+    return mass, centre
+
+
+def _find_reflector(plant: MultibodyPlant, context: object, flange: Frame, last: RevoluteJoint) -> Array | None:
+    """Pose on the flange of the frame ``reflector`` that moves rigidly with it, None if there is none."""
+    from pydrake.multibody.tree import FrameIndex, JointIndex
+
+    inboard = _inboard(plant)
+    for index in range(plant.num_frames()):
+        frame = plant.get_frame(FrameIndex(index))
+        if frame.name() != "reflector":
+            continue
+        j = inboard.get(int(frame.body().index()))
+        while j is not None and plant.get_joint(JointIndex(j)).type_name() == "weld":
+            j = inboard.get(int(plant.get_joint(JointIndex(j)).parent_body().index()))
+        if j == int(last.index()):
+            return frame.CalcPose(context, flange).GetAsMatrix4()
+    return None

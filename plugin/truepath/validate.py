@@ -1,0 +1,63 @@
+"""How good a calibration is on measurements that it has not seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from truepath import frames
+from truepath.iso9283 import Accuracy, accuracy
+from truepath.measurements import Measurements
+from truepath.model import CalibratedModel, nominal_flange_poses
+
+SCHEMA = "truepath.validation/1"
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Accuracy of the nominal and of the calibrated robot on the same poses."""
+
+    poses: int
+    nominal: Accuracy
+    calibrated: Accuracy
+
+    def to_dict(self) -> dict:
+        """The content of ``validate --json``, as the design document has it."""
+        return {
+            "schema": SCHEMA,
+            "poses": self.poses,
+            "nominal": self.nominal.to_dict(),
+            "calibrated": self.calibrated.to_dict(),
+        }
+
+
+def validate(model: CalibratedModel, measurements: Measurements) -> Validation:
+    """ISO 9283 accuracy before and after calibration; repeated visits of a pose count as one."""
+    groups = measurements.groups()
+    nominal, calibrated = (
+        accuracy(X_ME, measurements.p_ME, measurements.R_ME, groups)
+        for X_ME in (model.predict_nominal(measurements.q_rad), model.predict(measurements.q_rad))
+    )
+    return Validation(int(groups.max()) + 1, nominal, calibrated)
+
+
+def refit_frames(model: CalibratedModel, measurements: Measurements) -> CalibratedModel:
+    """The model after the tracker was moved: base and probe frame from a few new poses, all else as it was.
+
+    Nominal frames are estimated anew from the same poses, so that the comparison stays fair.
+
+    Raises:
+        CalibrationError: the poses fit neither robot, wherever it stands.
+    """
+    p_ME, R_ME = measurements.p_ME, measurements.R_ME
+    X_MB, X_FE = frames.register(model.flange_poses(measurements.q_rad), p_ME, R_ME)
+    X_BF = nominal_flange_poses(model.robot, measurements.q_rad)
+    X_MB_nominal, X_FE_nominal = frames.register(X_BF, p_ME, R_ME)
+    return replace(
+        model,
+        X_MB=X_MB,
+        X_FE=X_FE,
+        X_MB_nominal=X_MB_nominal,
+        X_FE_nominal=X_FE_nominal,
+        base_is_given=False,
+        tool_is_given=False,
+    )
