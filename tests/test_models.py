@@ -318,7 +318,7 @@ def test_robot_stands_on_the_pedestal(cell):
 
 def test_reflector_sits_31_mm_before_the_flange(cell):
     pose = cell.pose("reflector", HOME, relative_to="flange")
-    assert pose.IsNearlyEqualTo(RigidTransform([0, 0, 0.031]), 1e-12)
+    assert pose.IsNearlyEqualTo(RigidTransform([-0.07, 0, 0.031]), 1e-12)
 
 
 def test_moving_the_mount_in_a_context_moves_the_robot(cell):

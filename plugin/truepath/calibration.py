@@ -49,7 +49,8 @@ class Pose(_Part):
     @model_validator(mode="after")
     def _is_rotation(self) -> Self:
         R = np.array(self.rotation)
-        if np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
+        # Sizes first: the product of huge numbers is no number, and that would pass every comparison.
+        if np.abs(R).max() > 2 or np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
             raise ValueError("the matrix is no rotation")
         return self
 
@@ -230,7 +231,8 @@ class Calibration(_Part):
     @model_validator(mode="after")
     def _fits_the_robot(self) -> Self:
         n = len(self.robot.joint_names)
-        if [p.name for p in self.parameters] != [str(name) for name in parameter_names(n)]:
+        expected = [(str(name), name.joint, name.unit) for name in parameter_names(n)]
+        if [(p.name, p.joint, p.unit) for p in self.parameters] != expected:
             raise ValueError(f"the parameters are not those of a robot with {n} joints")
         shapes = (len(self.region.lower_rad), len(self.region.upper_rad), len(self.region.mean_rad))
         if shapes != (n, n, n) or np.shape(self.region.whitening) != (n, n):
@@ -315,14 +317,24 @@ def _read_json(path: Path) -> dict:
         found = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise InputError("the calibration cannot be read", file=path, found=found) from None
     try:
-        content = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+        content = json.loads(text, object_pairs_hook=_without_doubles)
+    except (ValueError, RecursionError) as error:  # ValueError alone: an integer of thousands of digits
         line = getattr(error, "lineno", None)
         raise InputError(
-            "the calibration is cut off or no JSON", file=path, line=line, found=getattr(error, "msg", "nested too deep")
+            "the calibration is cut off or no JSON",
+            file=path,
+            line=line,
+            found=getattr(error, "msg", str(error)),
         ) from None
     if not isinstance(content, dict):
         raise InputError("this is no calibration file", file=path, expected=f"an object with schema {SCHEMA!r}")
+    return content
+
+
+def _without_doubles(pairs: list[tuple[str, object]]) -> dict:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise ValueError("a name appears twice in one object")
     return content
 
 

@@ -48,9 +48,7 @@ def register(
     """
     if X_MB is None or X_FE is None:
         X_MB, X_FE = (
-            _register_points(X_BF, p_ME, X_MB, X_FE)
-            if R_ME is None
-            else _register_poses(X_BF, p_ME, R_ME, X_MB, X_FE)
+            _register_points(X_BF, p_ME, X_MB, X_FE) if R_ME is None else _register_poses(X_BF, p_ME, R_ME, X_MB, X_FE)
         )
     misfit = float(np.median(np.linalg.norm((X_MB @ X_BF @ X_FE)[:, :3, 3] - p_ME, axis=1)))
     if misfit > MAX_MEDIAN_MISFIT_M:
@@ -172,9 +170,7 @@ def _register_poses(
     return lie.make_pose(R_MB, p_MB), lie.make_pose(R_FE, p_FE)
 
 
-def _rotations(
-    R_BF: Array, R_ME: Array, weights: Array, X_MB: Array | None, X_FE: Array | None
-) -> tuple[Array, Array]:
+def _rotations(R_BF: Array, R_ME: Array, weights: Array, X_MB: Array | None, X_FE: Array | None) -> tuple[Array, Array]:
     if X_MB is not None:
         R_MB = X_MB[:3, :3]
         return R_MB, lie.nearest_rotation(np.einsum("k,kji,kjl->il", weights, R_MB @ R_BF, R_ME))

@@ -33,4 +33,3 @@ def independent_columns(jacobian: Array, order: Array) -> Array:
             independent[c] = True
             basis = np.column_stack([basis, v / own])
     return independent
-

@@ -50,7 +50,6 @@ def cross_validate(
     Returns:
         None where a fifth less data does not carry a calibration.
     """
-    from truepath.errors import CalibrationError
 
     X_calibrated = np.empty((len(measurements), 4, 4))
     X_nominal = np.empty_like(X_calibrated)

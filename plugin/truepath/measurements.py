@@ -11,16 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from truepath import lie
+from truepath.columns import ANGLE_UNITS, LENGTH_UNITS, QUATERNION_COLUMNS, unit_columns, unit_quaternions
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.robot import NominalRobot
 from truepath.tables import Table
 
-ANGLE_UNITS = {"rad": 1.0, "deg": np.pi / 180.0}
-LENGTH_UNITS = {"mm": 1e-3, "m": 1.0}
 OTHER_UNITS = {"t": "s", "temperature": "c", "payload": "kg"}
-QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
-QUATERNION_NORM_TOLERANCE = 1e-3
 LIMIT_TOLERANCE_RAD = np.radians(2.0)
 
 
@@ -98,8 +95,8 @@ def from_table(table: Table, num_joints: int) -> Measurements:
         InputError: every fault of a file, with line and column.
     """
     _check_units(table, num_joints)
-    q_names, q_factor = _unit_columns(table, [f"q{i + 1}" for i in range(num_joints)], ANGLE_UNITS)
-    p_names, p_factor = _unit_columns(table, ["x", "y", "z"], LENGTH_UNITS)
+    q_names, q_factor = unit_columns(table, [f"q{i + 1}" for i in range(num_joints)], ANGLE_UNITS)
+    p_names, p_factor = unit_columns(table, ["x", "y", "z"], LENGTH_UNITS)
     R_ME = None
     if any(name in table.header for name in QUATERNION_COLUMNS):
         table.require(QUATERNION_COLUMNS)
@@ -123,7 +120,9 @@ def from_table(table: Table, num_joints: int) -> Measurements:
         )
     pose_id = None
     if "pose_id" in table.header:
-        pose_id = np.unique(table.text("pose_id"), return_inverse=True)[1]
+        names = np.array(table.text("pose_id"))
+        _reject(table, (names == "")[:, None], ["pose_id"], "the name of a pose is missing", "a name in every row")
+        pose_id = np.unique(names, return_inverse=True)[1]
     return Measurements(
         q_rad=table.numbers(q_names) * q_factor,
         p_ME=table.numbers(p_names) * p_factor,
@@ -165,26 +164,9 @@ def check_joint_limits(measurements: Measurements, robot: NominalRobot, file: st
     )
 
 
-def unit_quaternions(table: Table, names: Sequence[str]) -> Array:
-    """``(N, 4)`` normalised quaternions; raises InputError for one whose length is not 1."""
-    quaternion = table.numbers(names)
-    length = np.linalg.norm(quaternion, axis=1)
-    bad = np.abs(length - 1.0) > QUATERNION_NORM_TOLERANCE
-    if bad.any():
-        k = int(np.argmax(bad))
-        raise InputError(
-            "the quaternion is not of unit length",
-            file=table.file,
-            line=int(table.lines[k]),
-            column=", ".join(names),
-            expected=f"length 1 within {QUATERNION_NORM_TOLERANCE}",
-            found=f"{length[k]:.6f}",
-        )
-    return quaternion / length[:, None]
-
-
 def _check_units(table: Table, num_joints: int) -> None:
     """Every name of the vocabulary that carries an unknown unit, or a joint that the robot does not have."""
+    joints = [f"q{i + 1}" for i in range(num_joints)]
     for name in table.header:
         match = re.fullmatch(r"(q\d+|x|y|z|t|temperature|payload)_([A-Za-z]+)", name)
         if not match:
@@ -203,7 +185,7 @@ def _check_units(table: Table, num_joints: int) -> None:
                 expected=" or ".join(f"{quantity}_{u}" for u in known),
                 found=name,
             )
-        if quantity[0] == "q" and not 1 <= int(quantity[1:]) <= num_joints:
+        if quantity[0] == "q" and quantity not in joints:
             raise InputError(
                 "a column for a joint that the robot does not have",
                 file=table.file,
@@ -211,34 +193,6 @@ def _check_units(table: Table, num_joints: int) -> None:
                 column=name,
                 expected=f"q1 to q{num_joints}",
             )
-
-
-def _unit_columns(table: Table, quantities: list[str], units: dict[str, float]) -> tuple[list[str], float]:
-    """Names of the columns of all quantities, in one common unit, and the factor to SI."""
-    for quantity in quantities:
-        present = [f"{quantity}_{unit}" for unit in units if f"{quantity}_{unit}" in table.header]
-        if len(present) > 1:
-            raise InputError(
-                "a quantity appears in two units",
-                file=table.file,
-                line=1,
-                column=present[1],
-                expected="one column",
-                found=" and ".join(present),
-            )
-    found = [u for u in units if any(f"{quantity}_{u}" in table.header for quantity in quantities)]
-    if len(found) > 1:
-        raise InputError(
-            "the units of " + ", ".join(quantities) + " differ",
-            file=table.file,
-            line=1,
-            expected="one unit for all",
-            found=" and ".join(found),
-        )
-    unit = found[0] if found else next(iter(units))
-    names = [f"{quantity}_{unit}" for quantity in quantities]
-    table.require(names)
-    return names, units[unit]
 
 
 def _optional(table: Table, name: str) -> Array | None:

@@ -15,7 +15,12 @@ if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.systems.framework import DiagramBuilder
 
-BUILT_IN = ("ur5", "ur10")
+BUILT_IN = {
+    "ur5": "ur5/ur5.urdf",
+    "ur10": "ur10/ur10.urdf",
+    "ur5_cell": "ur5/cell.dmd.yaml",
+    "ur10_cell": "ur10/cell.dmd.yaml",
+}
 
 
 def models_dir() -> Path:
@@ -31,7 +36,7 @@ def resolve(spec: str | Path) -> Path:
         InputError: neither a built-in name nor an existing ``.urdf`` or ``.dmd.yaml`` file.
     """
     if str(spec) in BUILT_IN:
-        return models_dir() / str(spec) / f"{spec}.urdf"
+        return models_dir() / BUILT_IN[str(spec)]
     path = Path(spec)
     if not path.is_file() or not path.name.endswith((".urdf", ".dmd.yaml")):
         raise InputError(
@@ -42,9 +47,9 @@ def resolve(spec: str | Path) -> Path:
     return path
 
 
-def cell_of(spec: str | Path) -> Path:
-    """The directives of the whole cell: for a built-in name the cell that comes with it, else the file itself."""
-    return models_dir() / str(spec) / "cell.dmd.yaml" if str(spec) in BUILT_IN else resolve(spec)
+def cell_of(spec: str | Path) -> str | Path:
+    """The whole cell: for a built-in robot the one that comes with it, else the model itself."""
+    return f"{spec}_cell" if f"{spec}_cell" in BUILT_IN else spec
 
 
 def make_parser(plant: MultibodyPlant) -> Parser:

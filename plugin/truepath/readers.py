@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
@@ -35,23 +36,36 @@ def read_measurements(path: str | Path, robot: NominalRobot, format: str = "csv"
     """
     if format not in READERS:
         raise InputError(f"unknown format {format!r}", expected="one of " + ", ".join(READERS))
+    _require_format(Path(path), format)
     measurements = READERS[format](Path(path), robot)
     check_joint_limits(measurements, robot, path)
     return measurements
 
 
 def _read_csv(path: Path, robot: NominalRobot) -> Measurements:
-    table = read_table(path)
-    for name, signature in (("jacobi2025", "x_dif"), ("landgraf2021", "Timestamp;Goal x")):
-        if any(column.startswith(signature) for column in table.header):
+    return from_table(read_table(path), robot.num_joints)
+
+
+def _require_format(path: Path, format: str) -> None:
+    """Raises InputError for a file whose first line is that of another format."""
+    try:
+        if not path.is_file():
+            return
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            first_line = file.readline(10_000)
+    except OSError:
+        return  # what is wrong with the file is told when it is read
+    if SIGNATURES[format] in first_line:
+        return
+    for other, signature in SIGNATURES.items():
+        if signature in first_line:
             raise InputError(
-                "this looks like a published data set",
+                "this looks like data of another format",
                 file=path,
                 line=1,
-                expected="the columns of truepath's CSV",
-                found=f"the columns of {name}; add --format {name}",
+                expected=f"the columns of format {format}",
+                found=f"the columns of format {other}; give --format {other}",
             )
-    return from_table(table, robot.num_joints)
 
 
 def _read_jacobi2025(path: Path, robot: NominalRobot) -> Measurements:
@@ -110,6 +124,8 @@ def _seconds(table: Table, name: str) -> np.ndarray:
     stamps = []
     for cell, line in zip(table.text(name), table.lines, strict=True):
         try:
+            if not re.fullmatch("[0-9]{14}", cell):  # strptime would also read fewer digits
+                raise ValueError
             stamps.append(datetime.strptime(cell, "%Y%m%d%H%M%S"))
         except ValueError:
             raise InputError(
@@ -122,6 +138,7 @@ def _origin(table: Table) -> dict:
     return {"line": table.lines, "source": table.file.name, "sha256": hashlib.sha256(table.raw).hexdigest()}
 
 
+SIGNATURES = {"csv": "q1_", "jacobi2025": "x_dif", "landgraf2021": "Timestamp;Goal x"}
 READERS: dict[str, Callable[[Path, NominalRobot], Measurements]] = {
     "csv": _read_csv,
     "jacobi2025": _read_jacobi2025,
@@ -129,9 +146,7 @@ READERS: dict[str, Callable[[Path, NominalRobot], Measurements]] = {
 }
 
 
-def with_nominal_frames(
-    measurements: Measurements, X_MB: np.ndarray | None, X_FE: np.ndarray | None
-) -> Measurements:
+def with_nominal_frames(measurements: Measurements, X_MB: np.ndarray | None, X_FE: np.ndarray | None) -> Measurements:
     """The same data with stated nominal frames; None leaves what the reader knew."""
     return replace(
         measurements,

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepath import lie
-from truepath.errors import InputError
+from truepath.arm import Arm, inboard_joints, locate_arm
 from truepath.lie import Array
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
-    from pydrake.multibody.tree import Frame, ModelInstanceIndex, RevoluteJoint
-
-FLANGE_NAMES = ("flange", "tool0", "ee_link", "tool_flange")
+    from pydrake.multibody.tree import ModelInstanceIndex, RevoluteJoint
+    from pydrake.systems.framework import Context
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +75,7 @@ class NominalRobot:
         text = json.dumps({"joints": list(self.joint_names), "screws": rounded[0], "zero_pose": rounded[1]})
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def gravity_torque(
-        self, q_rad: Array, payload_kg: Array | float = 0.0, p_FP: Array | None = None
-    ) -> Array:
+    def gravity_torque(self, q_rad: Array, payload_kg: Array | float = 0.0, p_FP: Array | None = None) -> Array:
         """Torque that gravity exerts about each joint axis, N m.
 
         Args:
@@ -126,134 +123,44 @@ def read_robot(
     base_frame: str | None = None,
     flange_frame: str | None = None,
 ) -> NominalRobot:
-    """Reads a serial arm of revolute joints out of a finalized plant.
+    """Reads a serial arm of revolute joints out of a finalized plant; arguments and errors as ``arm.locate_arm``."""
+    arm = locate_arm(plant, model_instance=model_instance, base_frame=base_frame, flange_frame=flange_frame)
+    return describe_arm(plant, arm)
 
-    Args:
-        plant: finalized; anything else may live in it.
-        model_instance: where the arm is; found by itself when exactly one instance has revolute joints.
-        base_frame, flange_frame: names; by default the instance's first body, and the end of the chain
-            (a frame called flange, tool0, ee_link or tool_flange, else the last body).
 
-    Raises:
-        InputError: plant not finalized, no arm or several, a joint of another type in the chain.
-    """
-    if not plant.is_finalized():
-        raise InputError("the plant is not finalized", expected="call plant.Finalize() first")
-    instance = _find_instance(plant) if model_instance is None else model_instance
-    base = _named_frame(plant, base_frame, instance) or _first_body_frame(plant, instance)
-    flange = _named_frame(plant, flange_frame, instance) or _find_flange(plant, instance)
-    joints = _chain(plant, base, flange)
-
-    context = plant.CreateDefaultContext()
-    for joint in joints:
-        joint.set_angle(context, 0.0)
-    X_WB = base.CalcPoseInWorld(context).GetAsMatrix4()
+def describe_arm(plant: MultibodyPlant, arm: Arm) -> NominalRobot:
+    """The nominal robot that an arm in a plant is."""
+    joints = arm.joints
+    context = zero_context(plant, arm)
+    X_WB = arm.base.CalcPoseInWorld(context).GetAsMatrix4()
     X_BW = lie.invert(X_WB)
     mass, centre = _carried_masses(plant, context, joints)
-    p_BoLcm = centre @ X_BW[:3, :3].T + X_BW[:3, 3]
-    X_BF = X_BW @ flange.CalcPoseInWorld(context).GetAsMatrix4()
-    reflector = _find_reflector(plant, context, flange, joints[-1])
     return NominalRobot(
-        name=plant.GetModelInstanceName(instance),
+        name=plant.GetModelInstanceName(arm.instance),
         joint_names=tuple(joint.name() for joint in joints),
         X_BA=np.stack([_axis_frame(joint, context, X_BW) for joint in joints]),
-        X_BF=X_BF,
+        X_BF=X_BW @ arm.flange.CalcPoseInWorld(context).GetAsMatrix4(),
         lower_rad=np.array([joint.position_lower_limits()[0] for joint in joints]),
         upper_rad=np.array([joint.position_upper_limits()[0] for joint in joints]),
         velocity_rad_s=np.array([joint.velocity_upper_limits()[0] for joint in joints]),
         acceleration_rad_s2=np.array([joint.acceleration_upper_limits()[0] for joint in joints]),
         link_mass_kg=mass,
-        p_BoLcm_B=p_BoLcm,
+        p_BoLcm_B=centre @ X_BW[:3, :3].T + X_BW[:3, 3],
         gravity_B=X_BW[:3, :3] @ plant.gravity_field().gravity_vector(),
         X_WB=X_WB,
-        X_FR=reflector,
+        X_FR=_find_reflector(plant, context, arm),
     )
 
 
-def chain_joints(plant: MultibodyPlant, robot: NominalRobot, instance: ModelInstanceIndex) -> list[RevoluteJoint]:
-    """The plant's joints that belong to a robot that was read from it, base to flange."""
-    return [plant.GetJointByName(name, instance) for name in robot.joint_names]
+def zero_context(plant: MultibodyPlant, arm: Arm) -> Context:
+    """A fresh context with all joints of the arm at zero."""
+    context = plant.CreateDefaultContext()
+    for joint in arm.joints:
+        joint.set_angle(context, 0.0)
+    return context
 
 
-def _find_instance(plant: MultibodyPlant) -> ModelInstanceIndex:
-    counts: dict[int, int] = {}
-    for index in plant.GetJointIndices():
-        joint = plant.get_joint(index)
-        if joint.type_name() == "revolute":
-            instance = int(joint.model_instance())
-            counts[instance] = counts.get(instance, 0) + 1
-    from pydrake.multibody.tree import ModelInstanceIndex
-
-    names = [plant.GetModelInstanceName(ModelInstanceIndex(i)) for i in counts]
-    if len(counts) != 1:
-        raise InputError(
-            "cannot tell which model in the plant is the arm",
-            expected="exactly one model instance with revolute joints, or model_instance given",
-            found=", ".join(names) or "no revolute joint",
-        )
-    return ModelInstanceIndex(next(iter(counts)))
-
-
-def _named_frame(plant: MultibodyPlant, name: str | None, instance: ModelInstanceIndex) -> Frame | None:
-    if name is None:
-        return None
-    for where in ((instance,), ()):
-        if plant.HasFrameNamed(name, *where):
-            return plant.GetFrameByName(name, *where)
-    known = [plant.get_frame(i).name() for i in plant.GetFrameIndices(instance)]
-    raise InputError(f"no frame called {name!r} in the plant", expected="one of " + ", ".join(filter(None, known)))
-
-
-def _first_body_frame(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame:
-    return plant.get_body(plant.GetBodyIndices(instance)[0]).body_frame()
-
-
-def _find_flange(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame:
-    for name in FLANGE_NAMES:
-        if plant.HasFrameNamed(name, instance):
-            return plant.GetFrameByName(name, instance)
-    parents = {int(plant.get_joint(i).parent_body().index()) for i in plant.GetJointIndices(instance)}
-    bodies = plant.GetBodyIndices(instance)
-    leaves = [plant.get_body(b) for b in bodies if int(b) not in parents]
-    if len(leaves) != 1:
-        raise InputError(
-            "cannot tell which body carries the tool",
-            expected="a frame called " + ", ".join(FLANGE_NAMES) + ", a single end of the chain, or flange_frame given",
-            found=", ".join(body.name() for body in leaves),
-        )
-    return leaves[0].body_frame()
-
-
-def _inboard(plant: MultibodyPlant) -> dict[int, int]:
-    """For each body (by index) the joint (by index) that connects it towards the world."""
-    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
-    return {int(joint.child_body().index()): int(joint.index()) for joint in joints}
-
-
-def _chain(plant: MultibodyPlant, base: Frame, flange: Frame) -> list[RevoluteJoint]:
-    from pydrake.multibody.tree import JointIndex
-
-    inboard, chain = _inboard(plant), []
-    body = flange.body()
-    while body.index() != base.body().index():
-        if int(body.index()) not in inboard:
-            raise InputError(f"frame {flange.name()!r} does not hang on frame {base.name()!r}")
-        joint = plant.get_joint(JointIndex(inboard[int(body.index())]))
-        if joint.type_name() == "revolute":
-            chain.append(joint)
-        elif joint.type_name() != "weld":
-            raise InputError(
-                f"joint {joint.name()!r} is of a type that truepath does not calibrate",
-                expected="revolute (or weld) joints between base and flange",
-                found=joint.type_name(),
-            )
-        body = joint.parent_body()
-    if len(chain) < 2:
-        raise InputError("the chain from base to flange is no arm", expected="two revolute joints or more")
-    return chain[::-1]
-
-
-def _axis_frame(joint: RevoluteJoint, context: object, X_BW: Array) -> Array:
+def _axis_frame(joint: RevoluteJoint, context: Context, X_BW: Array) -> Array:
     X_BJ = X_BW @ joint.frame_on_parent().CalcPoseInWorld(context).GetAsMatrix4()
     z = X_BJ[:3, :3] @ joint.revolute_axis()
     z = z / np.linalg.norm(z)
@@ -263,11 +170,11 @@ def _axis_frame(joint: RevoluteJoint, context: object, X_BW: Array) -> Array:
     return lie.make_pose(np.stack([x, np.cross(z, x), z], axis=1), X_BJ[:3, 3])
 
 
-def _carried_masses(plant: MultibodyPlant, context: object, joints: list[RevoluteJoint]) -> tuple[Array, Array]:
+def _carried_masses(plant: MultibodyPlant, context: Context, joints: list[RevoluteJoint]) -> tuple[Array, Array]:
     """Mass ``(n,)`` and its centre in the world ``(n, 3)``, grouped by the last chain joint inboard of each body."""
     from pydrake.multibody.tree import BodyIndex, JointIndex
 
-    inboard = _inboard(plant)
+    inboard = inboard_joints(plant)
     position = {int(joint.index()): i for i, joint in enumerate(joints)}
     mass, moment = np.zeros(len(joints)), np.zeros((len(joints), 3))
     for b in range(1, plant.num_bodies()):
@@ -286,11 +193,11 @@ def _carried_masses(plant: MultibodyPlant, context: object, joints: list[Revolut
     return mass, centre
 
 
-def _find_reflector(plant: MultibodyPlant, context: object, flange: Frame, last: RevoluteJoint) -> Array | None:
+def _find_reflector(plant: MultibodyPlant, context: Context, arm: Arm) -> Array | None:
     """Pose on the flange of the frame ``reflector`` that moves rigidly with it, None if there is none."""
     from pydrake.multibody.tree import FrameIndex, JointIndex
 
-    inboard = _inboard(plant)
+    inboard = inboard_joints(plant)
     for index in range(plant.num_frames()):
         frame = plant.get_frame(FrameIndex(index))
         if frame.name() != "reflector":
@@ -298,6 +205,6 @@ def _find_reflector(plant: MultibodyPlant, context: object, flange: Frame, last:
         j = inboard.get(int(frame.body().index()))
         while j is not None and plant.get_joint(JointIndex(j)).type_name() == "weld":
             j = inboard.get(int(plant.get_joint(JointIndex(j)).parent_body().index()))
-        if j == int(last.index()):
-            return frame.CalcPose(context, flange).GetAsMatrix4()
+        if j == int(arm.joints[-1].index()):
+            return frame.CalcPose(context, arm.flange).GetAsMatrix4()
     return None

@@ -76,7 +76,7 @@ class Table:
                 if any("." in cell for cell in cells):
                     raise ValueError
                 cells = [cell.replace(",", ".") for cell in cells]
-            if any("_" in cell for cell in cells):  # Python reads 1_000 as a number, nobody else does
+            if any("_" in cell or not cell.isascii() for cell in cells):  # Python reads 1_000 and ١٢, nobody else does
                 raise ValueError
             values = np.array([float(cell) for cell in cells])
         except ValueError:
@@ -102,7 +102,7 @@ class Table:
     def _fault(self, cell: str) -> str | None:
         if not cell:
             return "a number is missing"
-        if "_" in cell or (self.decimal == "," and "." in cell):
+        if "_" in cell or not cell.isascii() or (self.decimal == "," and "." in cell):
             return "text where a number belongs"
         try:
             value = float(cell.replace(",", ".") if self.decimal == "," else cell)
@@ -126,8 +126,9 @@ def read_table(path: str | Path, *, delimiter: str = ",", decimal: str = ".") ->
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise InputError("the file is not UTF-8 text", file=path, line=line, found=repr(raw[error.start])) from None
+        line = error.object[: error.start].count(b"\n") + 1
+        found = f"byte 0x{error.object[error.start]:02x}"
+        raise InputError("the file is not UTF-8 text", file=path, line=line, found=found) from None
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     rows, lines = [], []
     try:
@@ -142,6 +143,16 @@ def read_table(path: str | Path, *, delimiter: str = ",", decimal: str = ".") ->
     if not rows:
         raise InputError("the file is empty", file=path, expected="a header line and rows of numbers")
     header = tuple(cell.strip() for cell in rows[0])
+    if not any(header):
+        raise InputError("the first line is empty", file=path, line=1, expected="a header line")
+    if len(header) == 1 and any(other in header[0] for other in ",;\t"):
+        raise InputError(
+            "the columns are separated by something else",
+            file=path,
+            line=1,
+            expected=f"columns separated by {delimiter!r}",
+            found=header[0][:80],
+        )
     for name in header:
         if header.count(name) > 1:
             raise InputError(
@@ -162,13 +173,13 @@ def read_table(path: str | Path, *, delimiter: str = ",", decimal: str = ".") ->
 
 
 def _read_bytes(path: Path) -> bytes:
-    if not path.exists():
-        raise InputError("no such file", file=path)
-    if not path.is_file():
-        raise InputError("this is not a file", file=path)
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError("the file is larger than 1 GiB", file=path)
     try:
+        if not path.exists():
+            raise InputError("no such file", file=path)
+        if not path.is_file():
+            raise InputError("this is not a file", file=path)
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError("the file is larger than 1 GiB", file=path)
         return path.read_bytes()
     except OSError as error:
         raise InputError("the file cannot be read", file=path, found=error.strerror) from None

@@ -1,0 +1,212 @@
+"""Correction: joints that put the calibrated robot where the program wants the tool, or a clear refusal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truepath import inverse, lie
+from truepath.errors import CorrectionError, InputError
+from truepath.iso9283 import ErrorStatistics
+from truepath.lie import Array
+from truepath.model import CalibratedModel, nominal_flange_poses
+from truepath.region import Region
+
+MAX_CORRECTION_MM = 5.0
+MAX_JOINT_CORRECTION_RAD = 0.15
+MAX_JUMP_RAD = 0.02
+NEAR_SINGULAR = 0.03
+CHUNK = 20_000
+FORWARD_TOLERANCE_M, FORWARD_TOLERANCE_RAD = 1e-6, 1e-6
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Corrected joints of a path and what they are expected to bring.
+
+    Attributes:
+        q_rad: ``(N, n)`` corrected joints.
+        displacement_mm: ``(N,)`` how far each commanded flange position moved, in nominal kinematics.
+        error_before_mm, error_after_mm: ``(N,)`` predicted distance of the tool point from where it should be.
+        outside: ``(N,)`` True where the calibration data did not reach.
+        warnings: plain sentences for the user.
+    """
+
+    q_rad: Array
+    displacement_mm: Array
+    error_before_mm: Array
+    error_after_mm: Array
+    outside: Array
+    warnings: list[str] = field(default_factory=list)
+
+    def summary(self) -> dict:
+        """What a machine wants to know, as plain JSON types."""
+
+        def statistics(values: Array) -> dict[str, float]:
+            return vars(ErrorStatistics.of(values)).copy()
+
+        return {
+            "schema": "truepath.correction/1",
+            "waypoints": len(self.q_rad),
+            "displacement_mm": statistics(self.displacement_mm),
+            "predicted_error_before_mm": statistics(self.error_before_mm),
+            "predicted_error_after_mm": statistics(self.error_after_mm),
+            "outside_calibrated_region": int(self.outside.sum()),
+            "warnings": self.warnings,
+        }
+
+
+def correct(
+    model: CalibratedModel,
+    q_rad: Array,
+    *,
+    region: Region | None = None,
+    line: Array | None = None,
+    file: str = "path",
+    max_correction_mm: float = MAX_CORRECTION_MM,
+) -> Correction:
+    """Corrects a path given as nominal joints.
+
+    Args:
+        model: the calibrated robot.
+        q_rad: ``(N, n)`` programmed joints; what they reach in nominal kinematics is what the program means.
+        region: where the calibration was measured; waypoints outside are reported.
+        line: ``(N,)`` lines of the waypoints in their file, for messages.
+        file: name for messages.
+        max_correction_mm: no commanded position may move further.
+
+    Raises:
+        CorrectionError: a limit passed, no convergence, a jump against a neighbour, too large a
+            correction; with the line of the first waypoint concerned.
+    """
+    q_rad = np.atleast_2d(np.asarray(q_rad, float))
+    line = np.arange(len(q_rad)) + 1 if line is None else line
+    robot = model.robot
+    if q_rad.shape[1] != robot.num_joints:
+        raise InputError("the path has another number of joints", file=file, expected=str(robot.num_joints))
+    if robot.num_joints < 6:
+        raise InputError(
+            f"{robot.name} has {robot.num_joints} joints", expected="six or more: a pose has six degrees of freedom"
+        )
+    _refuse(
+        (q_rad < robot.lower_rad - 1e-9) | (q_rad > robot.upper_rad + 1e-9),
+        "the program itself passes a joint limit",
+        q_rad,
+        model,
+        line,
+        file,
+    )
+    parts = [_solve_chunk(model, q_rad[k : k + CHUNK], line[k : k + CHUNK], file) for k in range(0, len(q_rad), CHUNK)]
+    solution_q, singular, before, after = (np.concatenate(part) for part in zip(*parts, strict=True))
+    _refuse(
+        (solution_q < robot.lower_rad) | (solution_q > robot.upper_rad),
+        "the corrected joint passes its limit",
+        solution_q,
+        model,
+        line,
+        file,
+    )
+    _refuse_jumps(q_rad, solution_q, robot.joint_names, line, file)
+    commanded = nominal_flange_poses(robot, solution_q)[:, :3, 3] - nominal_flange_poses(robot, q_rad)[:, :3, 3]
+    displacement_mm = 1e3 * np.linalg.norm(commanded, axis=1)
+    if displacement_mm.max() > max_correction_mm:
+        k = int(np.argmax(displacement_mm > max_correction_mm))
+        raise CorrectionError(
+            "the correction is larger than allowed",
+            file=file,
+            line=int(line[k]),
+            expected=f"{max_correction_mm:g} mm at most (--max-correction-mm)",
+            found=f"{displacement_mm[k]:.3f} mm here, up to {displacement_mm.max():.3f} mm in the whole path",
+        )
+    outside = np.zeros(len(q_rad), bool) if region is None else ~region.contains(q_rad)
+    return Correction(
+        q_rad=solution_q,
+        displacement_mm=displacement_mm,
+        error_before_mm=before,
+        error_after_mm=after,
+        outside=outside,
+        warnings=_warnings(outside, singular, line),
+    )
+
+
+def _solve_chunk(model: CalibratedModel, q_rad: Array, line: Array, file: str) -> tuple[Array, Array, Array, Array]:
+    """Corrected joints, smallest singular values and the tool error in mm before and after, for some waypoints."""
+    goal = model.goal_flange_poses(nominal_flange_poses(model.robot, q_rad))
+    solution = inverse.solve(model.flange_poses_and_jacobian, goal, q_rad)
+    ok = (solution.position_error_m < FORWARD_TOLERANCE_M) & (solution.angle_error_rad < FORWARD_TOLERANCE_RAD)
+    change = np.abs(solution.q_rad - q_rad).max(axis=1)
+    if not (ok & (change < MAX_JOINT_CORRECTION_RAD)).all():
+        k = int(np.argmin(ok & (change < MAX_JOINT_CORRECTION_RAD)))
+        raise CorrectionError(
+            "no correction was found near the programmed joints" if not ok[k] else "the correction leaves the posture",
+            file=file,
+            line=int(line[k]),
+            expected=f"all within 1 um and 1 urad, no joint moving by {np.degrees(MAX_JOINT_CORRECTION_RAD):.1f} deg",
+            found=f"{1e6 * solution.position_error_m[k]:.3g} um, {1e6 * solution.angle_error_rad[k]:.3g} urad, "
+            f"{np.degrees(change[k]):.2f} deg; distance to singularity {solution.smallest_singular_value[k]:.3g}",
+        )
+    wanted = (goal @ model.X_FE)[:, :3, 3]
+    before, after = (
+        1e3 * np.linalg.norm((model.flange_poses(q) @ model.X_FE)[:, :3, 3] - wanted, axis=1)
+        for q in (q_rad, solution.q_rad)
+    )
+    return solution.q_rad, solution.smallest_singular_value, before, after
+
+
+def _refuse(beyond: Array, problem: str, q_rad: Array, model: CalibratedModel, line: Array, file: str) -> None:
+    if beyond.any():
+        k, i = np.argwhere(beyond)[0]
+        robot = model.robot
+        raise CorrectionError(
+            problem,
+            file=file,
+            line=int(line[k]),
+            column=f"q{i + 1} ({robot.joint_names[i]})",
+            expected=f"{robot.lower_rad[i]:.6f} to {robot.upper_rad[i]:.6f} rad",
+            found=f"{q_rad[k, i]:.6f} rad",
+        )
+
+
+def _refuse_jumps(programmed: Array, corrected: Array, names: tuple[str, ...], line: Array, file: str) -> None:
+    """The correction must vary smoothly: what it adds to a step between neighbours is bounded."""
+    added = np.abs(np.diff(corrected - programmed, axis=0))
+    # Neighbours far apart may differ more: the correction is a smooth function of the joints.
+    allowed = MAX_JUMP_RAD + 0.1 * np.abs(np.diff(programmed, axis=0)).max(axis=1, keepdims=True, initial=0.0)
+    if (added > allowed).any():
+        k, i = np.argwhere(added > allowed)[0]
+        raise CorrectionError(
+            "the correction jumps between neighbouring waypoints",
+            file=file,
+            line=int(line[k + 1]),
+            column=f"q{i + 1} ({names[i]})",
+            expected=f"a change of {np.degrees(float(allowed[k, 0])):.2f} deg at most",
+            found=f"{np.degrees(added[k, i]):.2f} deg",
+        )
+
+
+def _warnings(outside: Array, singular: Array, line: Array) -> list[str]:
+    warnings = []
+    if outside.any():
+        warnings.append(
+            f"{int(outside.sum())} of {len(outside)} waypoints lie outside the joints that were measured "
+            f"(first in line {int(line[np.argmax(outside)])}): only the rigid kinematics is extrapolated there"
+        )
+    near = singular < NEAR_SINGULAR
+    if near.any():
+        warnings.append(
+            f"{int(near.sum())} waypoints are close to a singularity (first in line {int(line[np.argmax(near)])}, "
+            f"smallest singular value {singular.min():.3g}): small errors need large joint motions there"
+        )
+    return warnings
+
+
+def predicted_deviation(model: CalibratedModel, q_programmed: Array, q_commanded: Array) -> Array:
+    """``(N, 6)`` rotation and translation by which the real tool misses what the program means, in the base frame.
+
+    Args:
+        q_programmed: ``(N, n)`` joints of the program, which say what it means.
+        q_commanded: ``(N, n)`` joints that the robot is sent to.
+    """
+    goal = model.goal_flange_poses(nominal_flange_poses(model.robot, q_programmed)) @ model.X_FE
+    return lie.pose_error(model.flange_poses(q_commanded) @ model.X_FE, goal)

@@ -1,0 +1,139 @@
+"""The preview: one HTML page that shows what a correction does, for people. It opens anywhere, without a network.
+
+``toolpaths`` computes what is to be seen, ``arm`` reads the robot's shapes, ``scene`` says it in the
+language of meshcat, ``page`` wraps it up. No server is started and nothing of Drake is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from truepath.calibration import Calibration
+from truepath.errors import InputError
+from truepath.files import write_atomically
+from truepath.iso9283 import ErrorStatistics
+from truepath.lie import Array
+from truepath.preview.arm import read_arm
+from truepath.preview.page import PageText, render
+from truepath.preview.scene import record_scene
+from truepath.preview.toolpaths import Toolpaths, animate, nice_magnification
+
+__all__ = ["PreviewSummary", "write_preview"]
+
+
+@dataclass(frozen=True)
+class PreviewSummary:
+    """What the page says, for whoever wrote it.
+
+    Attributes:
+        output: the page.
+        waypoints, outside_region: how many there are, and how many the calibration data did not reach.
+        uncorrected_mm, corrected_mm: distance of the real tool point from the programmed one at the
+            waypoints, as the calibration predicts it.
+        magnification: factor by which errors are drawn.
+        key_frames: of the animation; 1 where nothing moves.
+        missing_meshes: files that the robot model names and that could not be read; they are not drawn.
+    """
+
+    output: Path
+    waypoints: int
+    outside_region: int
+    uncorrected_mm: ErrorStatistics
+    corrected_mm: ErrorStatistics
+    magnification: float
+    key_frames: int
+    missing_meshes: tuple[str, ...]
+
+
+def write_preview(
+    output: str | Path,
+    calibration: Calibration,
+    q_programmed: Array,
+    q_corrected: Array,
+    *,
+    robot_source: str | Path,
+    magnification: float | Literal["auto"] = 50.0,
+    title: str = "Path preview",
+    labels: Sequence[str] | None = None,
+) -> PreviewSummary:
+    """Writes a self-contained page with the arm, the programmed path and the path of the real robot.
+
+    Args:
+        output: the page, replaced as a whole.
+        calibration: the robot as it is.
+        q_programmed: ``(N, n)`` joints of the program, rad; what they reach in nominal kinematics is what it means.
+        q_corrected: ``(N, n)`` joints that the real robot is to be sent to, rad.
+        robot_source: built-in name, URDF or Drake directives: where the shapes of the arm come from.
+        magnification: factor by which errors are drawn, or "auto" for a round one that makes them visible.
+        title: headline of the page; any text.
+        labels: N names of the waypoints, shown while the arm passes them.
+
+    Raises:
+        InputError: joints, labels or magnification that make no sense, a model that cannot be read or that
+            is not that of the calibration, or a page that cannot be written.
+    """
+    output = Path(output)
+    robot = calibration.model.robot
+    q_programmed, q_corrected = np.asarray(q_programmed, float), np.asarray(q_corrected, float)
+    _require_joints(q_programmed, q_corrected, robot.num_joints)
+    if labels is not None and len(labels) != len(q_programmed):
+        raise InputError("labels and waypoints differ in number", expected=str(len(q_programmed)), found=str(len(labels)))
+    arm = read_arm(robot_source, robot, calibration.robot.name)
+
+    outside = ~calibration.region.region().contains(q_programmed)
+    paths = Toolpaths.of(calibration.model, q_programmed, q_corrected)
+    uncorrected, corrected = (ErrorStatistics.of(errors) for errors in paths.errors_mm())
+    factor = nice_magnification(paths) if magnification == "auto" else _require_magnification(magnification)
+    frames = animate(calibration.model, q_programmed, q_corrected, factor)
+    recorded = record_scene(arm, calibration.model, q_programmed, q_corrected, outside, frames, factor)
+    text = PageText(
+        title=title,
+        robot=calibration.robot.name,
+        calibrated_utc=calibration.created_utc,
+        waypoints=len(q_programmed),
+        outside=int(outside.sum()),
+        magnification=factor,
+        uncorrected=uncorrected,
+        corrected=corrected,
+        model_error=None if calibration.heldout is None else calibration.heldout.calibrated.position_mm,
+        missing_meshes=arm.missing_meshes,
+    )
+    write_atomically(output, render(text, recorded, frames, labels))
+    return PreviewSummary(
+        output=output,
+        waypoints=len(q_programmed),
+        outside_region=int(outside.sum()),
+        uncorrected_mm=uncorrected,
+        corrected_mm=corrected,
+        magnification=factor,
+        key_frames=len(frames.time_s),
+        missing_meshes=arm.missing_meshes,
+    )
+
+
+def _require_joints(q_programmed: Array, q_corrected: Array, num_joints: int) -> None:
+    for name, q in (("programmed", q_programmed), ("corrected", q_corrected)):
+        if q.ndim != 2 or q.shape[1] != num_joints or len(q) == 0:
+            raise InputError(
+                f"the {name} joints cannot be shown",
+                expected=f"one waypoint or more with {num_joints} joints each",
+                found=f"an array of shape {q.shape}",
+            )
+        if not np.isfinite(q).all():
+            row = int(np.argmin(np.isfinite(q).all(axis=1)))
+            raise InputError(f"the {name} joints are no numbers at waypoint {row + 1}", found=str(q[row]))
+    if len(q_programmed) != len(q_corrected):
+        raise InputError(
+            "programmed and corrected path differ in length", expected=str(len(q_programmed)), found=str(len(q_corrected))
+        )
+
+
+def _require_magnification(magnification: float | str) -> float:
+    if not isinstance(magnification, (int, float)) or not 0 < magnification <= 1e4:
+        raise InputError("errors cannot be drawn at this scale", expected="a factor up to 10000", found=str(magnification))
+    return float(magnification)

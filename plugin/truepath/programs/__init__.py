@@ -1,0 +1,1 @@
+"""Programs: parse, rewrite, write. Nothing here knows of calibration."""

@@ -1,0 +1,108 @@
+"""Simulated measuring campaigns: poses free of collision, measured on a real robot with noise."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from truepath import lie
+from truepath.errors import InputError
+from truepath.lie import Array
+from truepath.measurements import Measurements
+from truepath.virtual.real_robot import RealRobot
+
+MOST_TRIES_PER_POSE = 400
+LEAST_HEIGHT_M = 0.05  # of the reflector above the floor: lower, the tracker does not see it
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """How a virtual robot is measured.
+
+    Attributes:
+        poses: number of different poses.
+        noise_mm: standard deviation of each measured coordinate.
+        orientation_noise_mrad: of each component of a measured orientation; None measures a mere reflector.
+        repeats: visits of each pose.
+        tracker: measure in the frame of a tracker that stands somewhere, instead of in the cell's world.
+        seed: of poses, noise and tracker.
+    """
+
+    poses: int = 300
+    noise_mm: float = 0.02
+    orientation_noise_mrad: float | None = None
+    repeats: int = 1
+    tracker: bool = False
+    seed: int = 0
+
+
+def free_poses(real: RealRobot, count: int, rng: np.random.Generator) -> Array:
+    """``(count, n)`` random joints within limits (half a turn at most), free of collision, the reflector in sight.
+
+    Raises:
+        InputError: hardly any pose of the cell is free.
+    """
+    lower = np.maximum(real.robot.lower_rad, -np.pi)
+    upper = np.minimum(real.robot.upper_rad, np.pi)
+    found: list[Array] = []
+    for _ in range(MOST_TRIES_PER_POSE * count):
+        q = rng.uniform(lower, upper)
+        if real.is_free(q) and real.reflector_poses(q[None])[0, 2, 3] > LEAST_HEIGHT_M:
+            found.append(q)
+            if len(found) == count:
+                return np.array(found)
+    raise InputError(f"only {len(found)} of {count} poses free of collision were found in {real.spec}")
+
+
+def measure(real: RealRobot, q_rad: Array, campaign: Campaign) -> Measurements:
+    """Measures the robot at joints ``(N, n)``, each ``campaign.repeats`` times, one round after the other."""
+    rng = np.random.default_rng([campaign.seed, 1])
+    X_MW = _somewhere(rng) if campaign.tracker else np.eye(4)
+    X_ME = np.tile(X_MW @ real.reflector_poses(q_rad), (campaign.repeats, 1, 1))
+    position = X_ME[:, :3, 3] + rng.normal(scale=1e-3 * campaign.noise_mm, size=(len(X_ME), 3))
+    R_ME = None
+    if campaign.orientation_noise_mrad is not None:
+        turn = rng.normal(scale=1e-3 * campaign.orientation_noise_mrad, size=(len(X_ME), 3))
+        R_ME = lie.from_rotation_vector(turn) @ X_ME[:, :3, :3]
+    return Measurements(
+        q_rad=np.tile(q_rad, (campaign.repeats, 1)),
+        p_ME=position,
+        R_ME=R_ME,
+        pose_id=np.tile(np.arange(len(q_rad)), campaign.repeats) if campaign.repeats > 1 else None,
+        source="virtual cell",
+    )
+
+
+def to_csv(measurements: Measurements) -> str:
+    """The data set as truepath's CSV."""
+    n = measurements.q_rad.shape[1]
+    columns = {f"q{i + 1}_rad": (measurements.q_rad[:, i], "%.12f") for i in range(n)}
+    columns |= {f"{axis}_mm": (1e3 * measurements.p_ME[:, k], "%.6f") for k, axis in enumerate("xyz")}
+    if measurements.R_ME is not None:
+        quaternion = lie.to_quaternion(measurements.R_ME)
+        columns |= {name: (quaternion[:, k], "%.12f") for k, name in enumerate(("qw", "qx", "qy", "qz"))}
+    if measurements.pose_id is not None:
+        columns["pose_id"] = (measurements.pose_id, "%d")
+    cells = np.stack([np.char.mod(form, values) for values, form in columns.values()], axis=1)
+    return "\n".join([",".join(columns), *(",".join(row) for row in cells)]) + "\n"
+
+
+def truth_json(real: RealRobot, campaign: Campaign) -> str:
+    """What was hidden, for whoever wants to check a calibration afterwards."""
+    content = {
+        "schema": "truepath.truth/1",
+        "cell": str(real.spec),
+        "campaign": asdict(campaign),
+        "hidden_frame_errors": real.hidden_errors,
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def _somewhere(rng: np.random.Generator) -> Array:
+    """Pose X_MW of the cell seen by a tracker that stands 2 to 4 m away, turned by any angle, level to 0.02 rad."""
+    angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(2.0, 4.0)
+    level = lie.from_rotation_vector(rng.normal(scale=0.02, size=3))
+    R_MW = level @ lie.from_rotation_vector(np.array([0.0, 0.0, angle]))
+    return lie.make_pose(R_MW, np.array([distance, rng.normal(), rng.normal(scale=0.3)]))

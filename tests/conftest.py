@@ -1,0 +1,125 @@
+"""Robots and data that the tests share."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+from truepath.plants import load_robot
+
+ROOT = Path(__file__).parents[1]
+
+# The same examples in every run: what a property test finds today it finds in everybody's run.
+settings.register_profile("truepath", derandomize=True, deadline=None, database=None)
+settings.load_profile("truepath")
+
+# Seven joints about axes in mixed directions (some not of unit length), turned joint frames, fixed joints
+# between moving ones, a load beside the chain, and a base that is neither upright nor at the origin.
+SEVEN_JOINT_URDF = """<?xml version="1.0"?>
+<robot name="seven" xmlns:drake="http://drake.mit.edu">
+  <link name="world"/>
+  <link name="foot">
+    <inertial><origin xyz="0.01 0 0.05"/><mass value="4"/>
+      <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>
+  </link>
+  <joint name="mounting" type="fixed">
+    <parent link="world"/><child link="foot"/><origin xyz="0.3 -0.2 0.7" rpy="0.5 -0.3 1.1"/>
+  </joint>
+{links}
+  <link name="counterweight">
+    <inertial><origin xyz="0 0.02 0.01" rpy="0.1 0 0"/><mass value="0.9"/>
+      <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial>
+  </link>
+  <joint name="counterweight_mount" type="fixed">
+    <parent link="link3"/><child link="counterweight"/><origin xyz="-0.15 0.04 0.02" rpy="0.3 0 0.2"/>
+  </joint>
+  <link name="flange"/>
+  <joint name="flange_mount" type="fixed">
+    <parent link="link7"/><child link="flange"/><origin xyz="0.02 -0.01 0.09" rpy="-0.4 0.6 0.2"/>
+  </joint>
+</robot>
+"""
+SEVEN_JOINT_LINKS = (  # axis, origin of the joint on what carries it, centre of mass, mass, limits
+    ("0 0 1", "0.02 0.01 0.18", "0.05 -0.04 0.3", "0.01 0.02 0.08", 3.1, -2.9, 2.9),
+    ("0 1 0", "0.00 0.05 0.16", "-0.3 0.1 0.2", "0.03 -0.02 0.10", 2.7, -2.0, 2.1),
+    ("1 1 0", "0.03 0.00 0.21", "0.4 0.3 -0.6", "-0.02 0.03 0.09", 2.2, -2.8, 2.7),
+    ("0 -1 0", "0.04 -0.03 0.19", "0.0 0.7 0.1", "0.01 0.01 0.07", 1.8, -2.2, 2.3),
+    ("-0.3 0.5 -0.8", "0.00 0.02 0.20", "0.2 -0.5 0.9", "0.02 -0.03 0.06", 1.5, -2.6, 2.8),
+    ("1 0 0", "-0.02 0.04 0.17", "-0.8 0.2 0.3", "0.00 0.02 0.05", 1.1, -2.1, 2.0),
+    ("0 2 1", "0.05 0.00 0.11", "0.6 -0.4 0.5", "0.01 0.00 0.04", 0.6, -3.0, 3.0),
+)
+BRACKETS = {3: "0.01 0.02 0.03", 6: "-0.02 0.01 0.04"}  # a bracket is welded to this link and carries the next joint
+
+
+def _seven_joint_links() -> str:
+    parts, carrier = [], "foot"
+    for number, (axis, xyz, rpy, centre, mass, lower, upper) in enumerate(SEVEN_JOINT_LINKS, start=1):
+        parts.append(f"""  <link name="link{number}">
+    <inertial><origin xyz="{centre}" rpy="0.2 0.1 0"/><mass value="{mass}"/>
+      <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
+  </link>
+  <joint name="joint{number}" type="revolute">
+    <parent link="{carrier}"/><child link="link{number}"/><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>
+    <limit lower="{lower}" upper="{upper}" velocity="{1 + number / 10}" effort="100"
+           drake:acceleration="{5 + number / 10}"/>
+  </joint>""")
+        carrier = f"link{number}"
+        if number in BRACKETS:
+            carrier = f"bracket{number}"
+            parts.append(f"""  <link name="{carrier}">
+    <inertial><origin xyz="0.01 0 0.02"/><mass value="0.4"/>
+      <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial>
+  </link>
+  <joint name="{carrier}_mount" type="fixed">
+    <parent link="link{number}"/><child link="{carrier}"/>
+    <origin xyz="{BRACKETS[number]}" rpy="0.3 -0.2 0.4"/>
+  </joint>""")
+    return "\n".join(parts)
+
+
+@pytest.fixture(scope="session")
+def ur5():
+    """The nominal UR5."""
+    return load_robot("ur5")
+
+
+@pytest.fixture(scope="session")
+def ur10():
+    """The nominal UR10."""
+    return load_robot("ur10")
+
+
+@pytest.fixture(scope="session")
+def seven_joint_urdf() -> str:
+    """Text of a URDF of a seven-joint arm; flange ``flange``, base link ``foot`` welded to the world askew."""
+    return SEVEN_JOINT_URDF.format(links=_seven_joint_links())
+
+
+@pytest.fixture(scope="session")
+def seven_joint_arm(tmp_path_factory, seven_joint_urdf) -> Path:
+    """That URDF as a file."""
+    path = tmp_path_factory.mktemp("seven") / "seven.urdf"
+    path.write_text(seven_joint_urdf)
+    return path
+
+
+@pytest.fixture(scope="session")
+def seven(seven_joint_arm):
+    """The nominal robot read from it."""
+    return load_robot(seven_joint_arm)
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """Folder of the published data sets: $TRUEPATH_DATA, or ``shared/data`` beside the repository.
+
+    Without it the test is skipped; on CI, where it must be there, the test fails.
+    """
+    folder = Path(os.environ.get("TRUEPATH_DATA") or ROOT.parent / "shared" / "data")
+    if folder.is_dir():
+        return folder
+    reason = f"no published data sets in {folder}: set TRUEPATH_DATA to their folder"
+    if os.environ.get("CI", "").lower() == "true":
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
