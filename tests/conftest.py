@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
 from truepath.plants import load_robot
 
 ROOT = Path(__file__).parents[1]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm, logm, polar
-
 from truepath import lie
 
 

@@ -149,7 +149,8 @@ def check_joint_limits(measurements: Measurements, robot: NominalRobot, file: st
     if not beyond.any():
         return
     k, i = np.argwhere(beyond)[0]
-    fits_as_degrees = np.all(
+    # One angle beyond is a slip; only where many are have the units been mixed up.
+    fits_as_degrees = beyond.mean() > 0.1 and np.all(
         (np.radians(q) >= robot.lower_rad - LIMIT_TOLERANCE_RAD)
         & (np.radians(q) <= robot.upper_rad + LIMIT_TOLERANCE_RAD)
     )

@@ -47,7 +47,8 @@ class Table:
         """Raises InputError for the first column that is not there, naming the one that looks like it."""
         for name in names:
             if name not in self.header:
-                near = difflib.get_close_matches(name, self.header, n=1, cutoff=0.6)
+                spare = [other for other in self.header if other not in names]
+                near = difflib.get_close_matches(name, spare, n=1, cutoff=0.6)
                 raise InputError(
                     "a column is missing",
                     file=self.file,

@@ -82,7 +82,9 @@ def write_preview(
     q_programmed, q_corrected = np.asarray(q_programmed, float), np.asarray(q_corrected, float)
     _require_joints(q_programmed, q_corrected, robot.num_joints)
     if labels is not None and len(labels) != len(q_programmed):
-        raise InputError("labels and waypoints differ in number", expected=str(len(q_programmed)), found=str(len(labels)))
+        raise InputError(
+            "labels and waypoints differ in number", expected=str(len(q_programmed)), found=str(len(labels))
+        )
     arm = read_arm(robot_source, robot, calibration.robot.name)
 
     outside = ~calibration.region.region().contains(q_programmed)
@@ -129,11 +131,15 @@ def _require_joints(q_programmed: Array, q_corrected: Array, num_joints: int) ->
             raise InputError(f"the {name} joints are no numbers at waypoint {row + 1}", found=str(q[row]))
     if len(q_programmed) != len(q_corrected):
         raise InputError(
-            "programmed and corrected path differ in length", expected=str(len(q_programmed)), found=str(len(q_corrected))
+            "programmed and corrected path differ in length",
+            expected=str(len(q_programmed)),
+            found=str(len(q_corrected)),
         )
 
 
 def _require_magnification(magnification: float | str) -> float:
     if not isinstance(magnification, (int, float)) or not 0 < magnification <= 1e4:
-        raise InputError("errors cannot be drawn at this scale", expected="a factor up to 10000", found=str(magnification))
+        raise InputError(
+            "errors cannot be drawn at this scale", expected="a factor up to 10000", found=str(magnification)
+        )
     return float(magnification)

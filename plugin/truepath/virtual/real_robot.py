@@ -71,6 +71,13 @@ class RealRobot:
             poses[k] = self._reflector.CalcPoseInWorld(self._context).GetAsMatrix4()
         return poses
 
+    def axis_lines(self) -> tuple[Array, Array]:
+        """True directions ``(n, 3)`` and points ``(n, 3)`` of the joint axes at zero joints, in W, by Drake."""
+        self._set(np.zeros(len(self._arm.joints)))
+        frames = [joint.frame_on_parent().CalcPoseInWorld(self._context) for joint in self._arm.joints]
+        directions = [X.rotation() @ joint.revolute_axis() for X, joint in zip(frames, self._arm.joints, strict=True)]
+        return np.array(directions), np.array([X.translation() for X in frames])
+
     def is_free(self, q_rad: Array) -> bool:
         """Whether the arm at joints ``(n,)`` touches neither itself nor the cell."""
         self._set(q_rad)
@@ -83,7 +90,8 @@ class RealRobot:
 
     def _perturb(self, rng: np.random.Generator, size: Imperfection) -> dict[str, dict[str, list[float]]]:
         """Moves the frames in the plant's context; returns by how much, frame by frame."""
-        frames = [(joint.frame_on_parent(), size.joint_position_mm, size.joint_rotation_mrad) for joint in self._arm.joints]
+        joint_size = (size.joint_position_mm, size.joint_rotation_mrad)
+        frames = [(joint.frame_on_parent(), *joint_size) for joint in self._arm.joints]
         mount = _frame_under(self.plant, self._arm.base)
         if mount is not None:
             frames.append((mount, size.base_position_mm, size.base_rotation_mrad))

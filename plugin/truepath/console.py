@@ -1,0 +1,101 @@
+"""What the command line prints: tables for people on standard output, progress and errors on standard error."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from truepath.calibration import Calibration
+    from truepath.correct import Correction
+    from truepath.iso9283 import Accuracy
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[str], None]]:
+    """A spinner while work goes on; the yielded function says what is being done now."""
+    with err.status(title) as status:
+        yield lambda text: status.update(f"{title}: {text}")
+
+
+def print_json(content: Any) -> None:
+    """For machines: nothing but JSON on standard output."""
+    print(json.dumps(content, indent=1, allow_nan=False))
+
+
+def print_accuracy(title: str, before: Accuracy, after: Accuracy) -> None:
+    """A table of errors of the nominal and of the calibrated robot."""
+    table = Table(title=title, title_justify="left", caption="nominal → calibrated", caption_justify="left")
+    table.add_column("error")
+    for name in ("mean", "rms", "p95", "max"):
+        table.add_column(name, justify="right")
+    rows = (
+        ("position, mm", before.position_mm, after.position_mm),
+        ("distance, mm", before.distance_mm, after.distance_mm),
+        ("orientation, mrad", before.orientation_mrad, after.orientation_mrad),
+    )
+    for label, old, new in rows:
+        if old is not None and new is not None:
+            cells = (f"{getattr(old, s):.3f} → {getattr(new, s):.3f}" for s in ("mean", "rms", "p95", "max"))
+            table.add_row(label, *cells)
+    out.print(table)
+
+
+def print_calibration(calibration: Calibration) -> None:
+    """What a person wants to know after calibrating."""
+    data, noise = calibration.data, calibration.noise
+    kind = "6D" if data.has_orientation else "3D"
+    out.print(f"[bold]{calibration.robot.name}[/bold] calibrated on {data.poses} poses ({kind}) of {data.file}")
+    if calibration.heldout is not None:
+        held_out = calibration.heldout
+        print_accuracy("on poses that the fit had not seen", held_out.nominal, held_out.calibrated)  # type: ignore[arg-type]
+    else:
+        out.print("[yellow]too few poses to hold any back: the accuracy on new poses is not known[/yellow]")
+    spread = f"{noise.position_mm:.4f} mm per axis"
+    if noise.orientation_mrad is not None:
+        spread += f", {noise.orientation_mrad:.4f} mrad per axis"
+    out.print(f"left unexplained (noise and what the model lacks): {spread}")
+    if data.outlier_lines:
+        shown = ", ".join(map(str, data.outlier_lines[:12])) + (" ..." if len(data.outlier_lines) > 12 else "")
+        out.print(f"[yellow]{len(data.outlier_lines)} outliers left out, lines {shown}[/yellow]")
+    held = [p for p in calibration.parameters if p.status == "held"]
+    for reason in dict.fromkeys(p.reason for p in held):
+        names = ", ".join(p.name for p in held if p.reason == reason)
+        out.print(f"held at nominal ({reason}):\n  {names}")
+
+
+def print_parameters(calibration: Calibration) -> None:
+    """Every parameter with its standard deviation."""
+    table = Table(title="axis deviations", title_justify="left")
+    for name, side in (("parameter", "left"), ("value", "right"), ("sigma", "right"), ("unit", "left"), ("", "left")):
+        table.add_column(name, justify=side)  # type: ignore[arg-type]
+    for p in calibration.parameters:
+        if p.joint is None:
+            continue
+        unit = {"m": "mm", "rad": "mrad"}[p.unit]
+        sigma = "" if p.status == "held" else f"{1e3 * p.sigma:.4f}"
+        table.add_row(p.name, f"{1e3 * p.value:.4f}", sigma, unit, "held" if p.status == "held" else "")
+    out.print(table)
+
+
+def print_correction(correction: Correction) -> None:
+    """Summary of a corrected path."""
+    before, after = correction.error_before_mm, correction.error_after_mm
+    out.print(
+        f"{len(correction.q_rad)} waypoints corrected by {correction.displacement_mm.mean():.3f} mm on average, "
+        f"{correction.displacement_mm.max():.3f} mm at most"
+    )
+    out.print(
+        f"predicted error of the tool: mean {before.mean():.3f} mm, max {before.max():.3f} mm before; "
+        f"{after.max():.1e} mm after, on top of what the calibration leaves unexplained"
+    )
+    for warning in correction.warnings:
+        out.print(f"[yellow]warning:[/yellow] {warning}")

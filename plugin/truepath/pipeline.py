@@ -1,0 +1,88 @@
+"""The steps that commands, demo and workflows have in common."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from truepath import lie
+from truepath.calibration import Calibration
+from truepath.correct import MAX_CORRECTION_MM, Correction, correct
+from truepath.errors import InputError
+from truepath.files import write_atomically
+from truepath.inverse import joints_along_path
+from truepath.lie import Array
+from truepath.programs.toolpath_csv import Toolpath, read_toolpath
+from truepath.robot import NominalRobot
+from truepath.virtual.simulate import Campaign
+
+
+@dataclass(frozen=True)
+class CorrectedToolpath:
+    """A toolpath file with its programmed joints ``(N, n)``, their correction, and the text of the new file."""
+
+    toolpath: Toolpath
+    q_programmed: Array
+    correction: Correction
+    text: str
+
+
+def correct_toolpath(
+    path: str | Path, calibration: Calibration, *, max_correction_mm: float = MAX_CORRECTION_MM
+) -> CorrectedToolpath:
+    """Reads a toolpath CSV and corrects it; writes nothing.
+
+    Raises:
+        InputError, CorrectionError: with file and line.
+    """
+    model, region = calibration.model, calibration.region.region()
+    toolpath = read_toolpath(path, model.robot.num_joints)
+    line, file = toolpath.table.lines, str(toolpath.table.file)
+    q = toolpath.q_rad
+    if q is None:
+        assert toolpath.X_BF is not None
+        q = joints_along_path(model.robot, toolpath.X_BF, region, line, file)
+    correction = correct(model, q, region=region, line=line, file=file, max_correction_mm=max_correction_mm)
+    return CorrectedToolpath(toolpath, q, correction, toolpath.with_joints(correction.q_rad))
+
+
+def stated_base(robot: NominalRobot, measured_in: str) -> Array | None:
+    """X_MB as stated on the command line: None for ``tracker``, the model's own for ``world``."""
+    if measured_in == "tracker":
+        return None
+    if measured_in == "world":
+        return robot.X_WB
+    raise InputError(f"unknown measurement frame {measured_in!r}", expected="tracker or world")
+
+
+def stated_probe(robot: NominalRobot, probe: str) -> Array | None:
+    """X_FE as stated on the command line: ``unknown``, ``model``, or ``x,y,z`` in mm on the flange."""
+    if probe == "unknown":
+        return None
+    if probe == "model":
+        if robot.X_FR is None:
+            raise InputError(f"the model of {robot.name} has no frame called 'reflector'", expected="--probe x,y,z")
+        return robot.X_FR
+    try:
+        offset = np.array([float(part) for part in probe.split(",")])
+    except ValueError:
+        offset = np.array([math.nan])
+    if offset.shape != (3,) or not np.isfinite(offset).all():
+        raise InputError(f"cannot read the place of the probe {probe!r}", expected="unknown, model, or x,y,z in mm")
+    return lie.make_pose(translation=offset * 1e-3)
+
+
+def simulate_campaign(spec: str, seed: int, campaign: Campaign, output: Path, truth: Path | None) -> int:
+    """Measures a virtual robot and writes the CSV (and what was hidden); returns the number of rows."""
+    from truepath.virtual.real_robot import RealRobot
+    from truepath.virtual.simulate import free_poses, measure, to_csv, truth_json
+
+    real = RealRobot(spec, seed)
+    measurements = measure(real, free_poses(real, campaign.poses, np.random.default_rng(campaign.seed)), campaign)
+    write_atomically(output, to_csv(measurements))
+    if truth is not None:
+        write_atomically(truth, truth_json(real, campaign))
+    return len(measurements)
