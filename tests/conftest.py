@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from hypothesis import strategies as st
 from truepath.plants import load_robot
 
 ROOT = Path(__file__).parents[1]
@@ -122,3 +123,31 @@ def data_dir() -> Path:
     if os.environ.get("CI", "").lower() == "true":
         pytest.fail(reason, pytrace=False)
     pytest.skip(reason)
+
+
+INSERTIONS = [b",", b";", b"\n", b"\r", b'"', b"\x00", b"\xff", b"-", b"e", b".", b"_", b"nan", b"9" * 400, b"{", b"]"]
+
+
+@st.composite
+def _spoilt(draw, good: bytes) -> bytes:
+    content = bytearray(good)
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, max(len(content) - 1, 0)))
+        kind = draw(st.sampled_from(["cut", "remove", "overwrite", "insert", "repeat"]))
+        if kind == "cut":
+            del content[at:]
+        elif kind == "remove":
+            del content[at : at + draw(st.integers(1, 40))]
+        elif kind == "overwrite":
+            content[at : at + 1] = bytes([draw(st.integers(0, 255))])
+        elif kind == "insert":
+            content[at:at] = draw(st.one_of(st.sampled_from(INSERTIONS), st.binary(min_size=1, max_size=4)))
+        else:
+            content[at:at] = content[at : at + draw(st.integers(1, 200))]
+    return bytes(content)
+
+
+@pytest.fixture(scope="session")
+def spoilt():
+    """Hypothesis strategy: the bytes of a good file after a few cuts, overwritten bytes, insertions and repeats."""
+    return _spoilt

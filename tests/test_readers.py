@@ -232,35 +232,11 @@ def test_stated_frames_replace_what_the_reader_knew_and_none_leaves_it(write, ur
 
 # Spoilt files
 
-INSERTIONS = st.sampled_from(
-    [b",", b";", b"\n", b"\r", b'"', b"\x00", b"\xff", b"-", b"e", b".", b"_", b"nan", b"9" * 400]
-)
-
-
-@st.composite
-def spoilt(draw, good: bytes) -> bytes:
-    """The good file after a few random cuts, overwritten bytes, insertions and shuffled pieces."""
-    content = bytearray(good)
-    for _ in range(draw(st.integers(1, 3))):
-        at = draw(st.integers(0, max(len(content) - 1, 0)))
-        kind = draw(st.sampled_from(["cut", "remove", "overwrite", "insert", "repeat"]))
-        if kind == "cut":
-            del content[at:]
-        elif kind == "remove":
-            del content[at : at + draw(st.integers(1, 40))]
-        elif kind == "overwrite":
-            content[at : at + 1] = bytes([draw(st.integers(0, 255))])
-        elif kind == "insert":
-            content[at:at] = draw(st.one_of(INSERTIONS, st.binary(min_size=1, max_size=4)))
-        else:
-            content[at:at] = content[at : at + draw(st.integers(1, 200))]
-    return bytes(content)
-
 
 @pytest.mark.parametrize("format", SAMPLES)
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(data=st.data())
-def test_a_spoilt_file_is_read_or_refused_and_nothing_else(tmp_path_factory, ur10, format, data):
+def test_a_spoilt_file_is_read_or_refused_and_nothing_else(tmp_path_factory, ur10, spoilt, format, data):
     path = tmp_path_factory.getbasetemp() / f"spoilt_{format}.csv"
     path.write_bytes(data.draw(spoilt(SAMPLES[format].encode())))
     try:
@@ -287,8 +263,8 @@ def test_a_file_cut_off_anywhere_never_yields_more_or_other_rows_than_were_whole
         outcomes.add("read")
         rows = len(part)
         assert rows <= len(whole)
-        # The last row may have lost digits of its last cell, which nothing in the file gives away.
-        np.testing.assert_array_equal(part.q_rad, whole.q_rad[:rows] if format != "jacobi2025" else part.q_rad)
+        # The last cell of the last row, an angle in one format, may have lost digits: nothing gives that away.
         np.testing.assert_array_equal(part.q_rad[:-1], whole.q_rad[: rows - 1])
+        np.testing.assert_array_equal(part.q_rad[:, :-1], whole.q_rad[:rows, :-1])
         np.testing.assert_array_equal(part.p_ME, whole.p_ME[:rows])
     assert outcomes == {"read", "refused"}

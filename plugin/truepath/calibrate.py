@@ -6,30 +6,27 @@ these, a least-squares fit of the rest in which the noise is estimated too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from threadpoolctl import threadpool_limits
 
 from truepath import frames, lie, poe
+from truepath.effect_fit import EffectFit, fit_effects
 from truepath.errors import CalibrationError
 from truepath.identifiability import independent_columns
-from truepath.levenberg_marquardt import Solution, covariance, minimise, noise_components
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel, no_deviation, nominal_flange_poses
 from truepath.poe_symbolic import PoseProblem
 from truepath.robot import NominalRobot
+from truepath.robust_fit import RobustFit
 
-OUTLIER_PROBABILITY = 1e-3  # of calling any row of a clean data set an outlier
-OUTLIER_MARGIN = 1.5  # what is left of an imperfect model has longer tails than noise
-ROBUST_ROUNDS, MAX_ROUNDS = 3, 30
-NEAR_ENOUGH = 0.1  # of half the chi-square
 SPARE_POSES = 3
 PRIOR_WIDTH = 3.0  # times the plausible size: wide enough not to matter where the data says anything
 REDUNDANT = "redundant: other free parameters have the same effect"
 NOT_SEEN = f"not seen: the data leaves it more uncertain than {PRIOR_WIDTH:.0f} times its plausible size"
-NOISE_FLOOR = 1e-10  # m and rad; keeps data without noise solvable
 LEAST_JOINT_SPREAD_RAD = 1e-3
 
 
@@ -45,7 +42,8 @@ class Fit:
         sigma_position_m, sigma_orientation_rad: noise per axis, estimated; the latter None for 3D data.
         outlier: ``(N,)`` True for poses left out.
         residual: ``(N, m)`` predicted minus measured, in the measurement frame.
-        iterations: evaluations of the model.
+        iterations: evaluations of the model by the kinematic fit.
+        log_evidence: log marginal likelihood of the poses that are no outliers, to compare sets of effects.
     """
 
     model: CalibratedModel
@@ -57,6 +55,7 @@ class Fit:
     outlier: Array
     residual: Array
     iterations: int
+    log_evidence: float
 
     @property
     def sigma(self) -> Array:
@@ -73,8 +72,14 @@ def nominal_frames(robot: NominalRobot, measurements: Measurements) -> tuple[Arr
     return frames.register(X_BF, measurements.p_ME, measurements.R_ME, X_MB=measurements.X_MB_nominal, X_FE=X_FE)
 
 
-def calibrate(robot: NominalRobot, measurements: Measurements) -> Fit:
-    """Estimates axis deviations, base frame and probe frame.
+@threadpool_limits.wrap(limits=1)  # threads on matrices of this size cost more than they bring
+def calibrate(robot: NominalRobot, measurements: Measurements, effects: Sequence[str] = ()) -> Fit:
+    """Estimates axis deviations, base frame and probe frame, and the sizes of named effects.
+
+    Args:
+        robot: nominal robot.
+        measurements: the data.
+        effects: names from ``effects.EFFECTS``; how much of each there is, joint by joint, is learnt.
 
     Raises:
         CalibrationError: too few poses, all poses alike, units or robot plainly wrong, no convergence.
@@ -86,14 +91,25 @@ def calibrate(robot: NominalRobot, measurements: Measurements) -> Fit:
     free = independent_columns(problem.evaluate(no_deviation(robot))[1], _order(names))
     held = {int(i): REDUNDANT for i in np.flatnonzero(~free)}
     prior_sigma = np.array([PRIOR_WIDTH * name.prior_scale if name.group == "axis" else np.inf for name in names])
-    fit = _RobustFit(problem, free, prior_sigma)
-    while unseen := fit.run():
+    kinematic = RobustFit(problem, free, prior_sigma)
+    while unseen := kinematic.run():
         held.update(dict.fromkeys(unseen, NOT_SEEN))
-    free, p, solution, sigma = fit.free, fit.p, fit.solution, fit.sigma
+    found = fit_effects(kinematic, robot, measurements, list(effects))
+    return _describe(robot, measurements, problem, names, held, kinematic, found)
 
-    n = robot.num_joints
+
+def _describe(
+    robot: NominalRobot,
+    measurements: Measurements,
+    problem: PoseProblem,
+    names: tuple[poe.ParameterName, ...],
+    held: dict[int, str],
+    kinematic: RobustFit,
+    found: EffectFit,
+) -> Fit:
+    n, p, free = robot.num_joints, found.p, kinematic.free
     full = np.zeros((len(p), len(p)))
-    full[np.ix_(free, free)] = covariance(solution, sigma)
+    full[np.ix_(free, free)] = found.covariance
     X_MB_nominal, X_FE_nominal = nominal_frames(robot, measurements)
     model = CalibratedModel(
         robot=robot,
@@ -104,106 +120,26 @@ def calibrate(robot: NominalRobot, measurements: Measurements) -> Fit:
         X_FE_nominal=X_FE_nominal,
         base_is_given=measurements.X_MB_nominal is not None,
         tool_is_given=measurements.X_FE_nominal is not None,
+        effects=found.effects,
     )
     return Fit(
         model=model,
         names=names,
         covariance=full,
         held=held,
-        sigma_position_m=float(sigma[0]),
-        sigma_orientation_rad=float(sigma[3]) if measurements.has_orientation else None,
-        outlier=solution.weights == 0.0,
-        residual=solution.residual,
-        iterations=fit.iterations,
+        sigma_position_m=float(found.sigma[0]),
+        sigma_orientation_rad=float(found.sigma[3]) if measurements.has_orientation else None,
+        outlier=~found.inlier,
+        residual=found.residual,
+        iterations=kinematic.iterations,
+        log_evidence=found.log_evidence,
     )
-
-
-class _RobustFit:
-    """Robust fit, rejection of outliers, least squares; the noise is estimated all along."""
-
-    def __init__(self, problem: PoseProblem, free: Array, prior_sigma: Array) -> None:
-        self.problem, self.free, self.prior_sigma = problem, free.copy(), prior_sigma
-        self.groups = [slice(k, k + 3) for k in range(0, problem.components, 3)]
-        self.p, self.iterations = np.zeros(len(free)), 0
-        residual = problem.evaluate(self.p)[0]
-        self.sigma = np.concatenate([np.full(3, _median_noise(residual[:, group])) for group in self.groups])
-        self.solution: Solution | None = None
-
-    def run(self) -> list[int]:
-        """Fits. Returns the parameters that turned out to be unseen and are free no longer: then run again."""
-        for _ in range(ROBUST_ROUNDS):
-            self._step(None, tolerance=NEAR_ENOUGH)
-        if unseen := self._drop_unseen():
-            return unseen
-        inlier = self._inliers()
-        for _ in range(MAX_ROUNDS):
-            before, sigma_before = inlier, self.sigma
-            self._step(inlier)
-            inlier = self._inliers()
-            # Only the ratio of position to orientation noise moves the solution.
-            balanced = np.allclose(self.sigma / self.sigma[0], sigma_before / sigma_before[0], rtol=1e-3)
-            if balanced and np.array_equal(inlier, before):
-                break
-        return self._drop_unseen()
-
-    def _step(self, inlier: Array | None, **options: float) -> None:
-        known = self.solution
-        self.solution = minimise(
-            self._evaluate,
-            self.p[self.free],
-            self.sigma,
-            precision=self.prior_sigma[self.free] ** -2.0,
-            inlier=inlier,
-            evaluated=None if known is None else (known.residual, known.jacobian),
-            **options,
-        )
-        self.p[self.free] = self.solution.x
-        self.iterations += self.solution.iterations
-        self.sigma = np.maximum(noise_components(self.solution, self.sigma, self.groups), NOISE_FLOOR)
-
-    def _inliers(self) -> Array:
-        """``(N,)`` False where a pose lies further off than noise of this size ever puts one."""
-        N, m = self.solution.residual.shape
-        limit = stats.chi2.isf(OUTLIER_PROBABILITY / N, m) * OUTLIER_MARGIN**2
-        return np.sum((self.solution.residual / self.sigma) ** 2, axis=1) <= limit
-
-    def _evaluate(self, x: Array) -> tuple[Array, Array]:
-        p = self.p.copy()
-        p[self.free] = x
-        residual, J = self.problem.evaluate(p)
-        return residual, J[:, :, self.free]
-
-    def _drop_unseen(self) -> list[int]:
-        """Holds, worst first, every parameter about which the wide prior says more than the data."""
-        index, information = np.flatnonzero(self.free), np.linalg.inv(covariance(self.solution, self.sigma))
-        dropped = []
-        while True:
-            uncertain = np.sqrt(np.diag(np.linalg.inv(information))) / self.prior_sigma[index]
-            worst = int(np.argmax(uncertain))
-            if uncertain[worst] <= np.sqrt(0.5):
-                break
-            dropped.append(int(index[worst]))
-            information = np.delete(np.delete(information, worst, 0), worst, 1)
-            index = np.delete(index, worst)
-        if dropped:
-            self.free[dropped], self.p[dropped], self.solution = False, 0.0, None
-        return dropped
-
-
-def _median_noise(residual: Array) -> float:
-    """Noise per axis from the median length of residuals ``(N, 3)``; 1.538 is the median of a chi with 3 dof."""
-    return max(float(np.median(np.linalg.norm(residual, axis=1))) / 1.538, NOISE_FLOOR)
 
 
 def _order(names: tuple[poe.ParameterName, ...]) -> Array:
     """Frames first, then axes from the tool inwards: what is redundant is then held at the base of the robot."""
     rank = [-1 if name.joint is None else -name.joint + 1000 for name in names]
     return np.argsort(rank, kind="stable")
-
-
-def _component_scale(measurements: Measurements) -> Array:
-    """Brings rows of position (m) and orientation (rad) to a common size for the rank test."""
-    return np.ones((1, 6 if measurements.has_orientation else 3, 1))
 
 
 def _require_poses(robot: NominalRobot, measurements: Measurements) -> None:

@@ -16,6 +16,7 @@ from truepath.region import Region
 MAX_CORRECTION_MM = 5.0
 MAX_JOINT_CORRECTION_RAD = 0.15
 MAX_JUMP_RAD = 0.02
+LIMIT_ROUNDING_RAD = 1e-9  # a limit written with few decimals is still that limit
 NEAR_SINGULAR = 0.03
 CHUNK = 20_000
 FORWARD_TOLERANCE_M, FORWARD_TOLERANCE_RAD = 1e-6, 1e-6
@@ -89,8 +90,11 @@ def correct(
         raise InputError(
             f"{robot.name} has {robot.num_joints} joints", expected="six or more: a pose has six degrees of freedom"
         )
+    if len(q_rad) == 0:
+        raise InputError("the path has no waypoints", file=file)
+    lower, upper = robot.lower_rad - LIMIT_ROUNDING_RAD, robot.upper_rad + LIMIT_ROUNDING_RAD
     _refuse(
-        (q_rad < robot.lower_rad - 1e-9) | (q_rad > robot.upper_rad + 1e-9),
+        ~((q_rad >= lower) & (q_rad <= upper)),  # in this way round for what is no number
         "the program itself passes a joint limit",
         q_rad,
         model,
@@ -100,7 +104,7 @@ def correct(
     parts = [_solve_chunk(model, q_rad[k : k + CHUNK], line[k : k + CHUNK], file) for k in range(0, len(q_rad), CHUNK)]
     solution_q, singular, before, after = (np.concatenate(part) for part in zip(*parts, strict=True))
     _refuse(
-        (solution_q < robot.lower_rad) | (solution_q > robot.upper_rad),
+        (solution_q < lower) | (solution_q > upper),
         "the corrected joint passes its limit",
         solution_q,
         model,
@@ -110,8 +114,9 @@ def correct(
     _refuse_jumps(q_rad, solution_q, robot.joint_names, line, file)
     commanded = nominal_flange_poses(robot, solution_q)[:, :3, 3] - nominal_flange_poses(robot, q_rad)[:, :3, 3]
     displacement_mm = 1e3 * np.linalg.norm(commanded, axis=1)
-    if displacement_mm.max() > max_correction_mm:
-        k = int(np.argmax(displacement_mm > max_correction_mm))
+    too_far = ~(displacement_mm <= max_correction_mm)
+    if too_far.any():
+        k = int(np.argmax(too_far))
         raise CorrectionError(
             "the correction is larger than allowed",
             file=file,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from truepath.arm import Arm
 
 DRAKE_NAMESPACE = "http://drake.mit.edu"
+WORLD = "world"
 
 
 def joint_motions(model: CalibratedModel) -> Array:
@@ -130,7 +131,8 @@ def write_calibrated_urdf(model: CalibratedModel, urdf: str | Path, output: str 
     import yourdfpy
 
     description = yourdfpy.URDF.load(str(urdf), build_scene_graph=False, load_meshes=False)
-    inboard = {joint.child: joint for joint in description.robot.joints}
+    # Drake's base of the arm is the link that is fixed to the link ``world``, if there is such a link.
+    inboard = {joint.child: joint for joint in description.robot.joints if joint.parent != WORLD}
     joints = [_joint(description, name, urdf) for name in model.robot.joint_names]
     joints.append(_flange_joint(model, joints[-1].child, inboard, urdf))
     moved, motion_of_link = [], np.eye(4)
@@ -167,7 +169,7 @@ def _flange_joint(model: CalibratedModel, last_link: str, inboard: dict[str, Any
 
 
 def _zero_pose(link: str, inboard: dict[str, Any]) -> Array:
-    """Pose ``(4, 4)`` of a link in the root link, all joints at zero."""
+    """Pose ``(4, 4)`` of a link in the base link, all joints at zero."""
     X = np.eye(4)
     while link in inboard:
         X = _origin(inboard[link]) @ X

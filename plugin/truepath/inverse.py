@@ -82,7 +82,8 @@ def joints_along_path(robot: NominalRobot, X_BF: Array, prefer: Region, line: Ar
     """Nominal joints ``(N, n)`` for a path of flange poses ``(N, 4, 4)``, all on one arm branch.
 
     The postures that reach the first waypoint are tried in turn, the one nearest to the joints that
-    ``prefer`` is about first, until the whole path can be followed.
+    ``prefer`` is about first, until the whole path can be followed. A joint that would run into its limit
+    starts a whole turn away from it if that gives it the room.
 
     Raises:
         CorrectionError: a waypoint out of reach or beyond a limit, or the path leaves every branch; with its line.
@@ -90,14 +91,14 @@ def joints_along_path(robot: NominalRobot, X_BF: Array, prefer: Region, line: Ar
     failures: list[CorrectionError] = []
     for q_first in _postures(robot, X_BF[0], prefer, int(line[0]), file):
         try:
-            return _follow(robot, X_BF, q_first, line, file)
+            return _within_limits(robot, _follow(robot, X_BF, q_first, line, file), line, file)
         except CorrectionError as error:
             failures.append(error)
     raise max(failures, key=lambda error: error.line or 0)
 
 
 def _follow(robot: NominalRobot, X_BF: Array, q_first: Array, line: Array, file: str) -> Array:
-    """Follows the path from its first joints, in blocks that each start from the last joints known."""
+    """Follows the path from its first joints, in blocks that each start from the last joints known; knows no limits."""
     forward = nominal_model(robot).flange_poses_and_jacobian
     q = np.empty((len(X_BF), robot.num_joints))
     q[0] = q_first
@@ -107,8 +108,7 @@ def _follow(robot: NominalRobot, X_BF: Array, q_first: Array, line: Array, file:
         start = np.broadcast_to(q[known - 1], (end - known, robot.num_joints))
         solution = solve(forward, X_BF[known:end], start)
         steps = np.abs(np.diff(np.concatenate([q[known - 1 : known], solution.q_rad]), axis=0)).max(axis=1)
-        within = ((solution.q_rad >= robot.lower_rad) & (solution.q_rad <= robot.upper_rad)).all(axis=1)
-        good = solution.converged & within & (steps < MAX_PATH_STEP_RAD)
+        good = solution.converged & (steps < MAX_PATH_STEP_RAD)
         accepted = len(good) if good.all() else int(np.argmin(good))
         q[known : known + accepted] = solution.q_rad[:accepted]
         if accepted == 0 and block == 1:
@@ -116,14 +116,30 @@ def _follow(robot: NominalRobot, X_BF: Array, q_first: Array, line: Array, file:
                 "the path cannot be followed to this waypoint on one arm branch",
                 file=file,
                 line=int(line[known]),
-                expected="a reachable pose within the joint limits, "
-                f"no joint stepping by {np.degrees(MAX_PATH_STEP_RAD):.0f} deg or more",
-                found=f"{1e3 * solution.position_error_m[0]:.3f} mm missing, step {np.degrees(steps[0]):.1f} deg"
-                + ("" if within[0] else ", beyond a joint limit"),
+                expected=f"a reachable pose, no joint stepping by {np.degrees(MAX_PATH_STEP_RAD):.0f} deg or more",
+                found=f"{1e3 * solution.position_error_m[0]:.3f} mm missing, step {np.degrees(steps[0]):.1f} deg",
             )
         known += accepted
         block = min(2 * block, LARGEST_BLOCK) if good.all() else max(1, accepted // 2, block // 8)
     return q
+
+
+def _within_limits(robot: NominalRobot, q: Array, line: Array, file: str) -> Array:
+    """The same path ``(N, n)``, joints turned by whole turns where that brings all of it within the limits."""
+    turn = 2 * np.pi
+    least = np.ceil((robot.lower_rad - q.min(axis=0)) / turn)
+    most = np.floor((robot.upper_rad - q.max(axis=0)) / turn)
+    if (least > most).any():
+        k, i = np.argwhere(((q < robot.lower_rad) | (q > robot.upper_rad)) & (least > most))[0]
+        raise CorrectionError(
+            "the path cannot be followed to this waypoint within the joint limits",
+            file=file,
+            line=int(line[k]),
+            column=f"q{i + 1} ({robot.joint_names[i]})",
+            expected=f"{robot.lower_rad[i]:.6f} to {robot.upper_rad[i]:.6f} rad",
+            found=f"{q[k, i]:.6f} rad",
+        )
+    return q + turn * np.clip(0.0, least, most)
 
 
 def _postures(robot: NominalRobot, X_BF: Array, prefer: Region, line: int, file: str) -> Array:
@@ -147,5 +163,6 @@ def _postures(robot: NominalRobot, X_BF: Array, prefer: Region, line: int, file:
             expected=f"a flange pose within reach of {robot.name}, in its base frame",
             found=f"closest {1e3 * float(solution.position_error_m.min()):.1f} mm away",
         )
-    different = np.unique(np.round(q[usable], 6), axis=0)
+    q = q[usable]
+    different = q[np.unique(np.round(q, 6), axis=0, return_index=True)[1]]
     return different[np.argsort(prefer.distance(different), kind="stable")][:MOST_POSTURES]

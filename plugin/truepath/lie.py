@@ -6,11 +6,13 @@ Quaternions are scalar first, ``(w, x, y, z)``. Lengths in metres, angles in rad
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]  # dtype and shape stand in each docstring
 
 
 def make_pose(rotation: Array | None = None, translation: Array | None = None) -> Array:

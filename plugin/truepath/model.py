@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truepath import lie, poe
 from truepath.lie import Array
 from truepath.robot import NominalRobot
+
+if TYPE_CHECKING:
+    from truepath.effects.base import FittedTerm
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +25,7 @@ class CalibratedModel:
         X_MB, X_FE: ``(4, 4)`` estimated base and probe frame.
         X_MB_nominal, X_FE_nominal: ``(4, 4)`` the same for the nominal robot: as stated, or its best fit.
         base_is_given, tool_is_given: whether that nominal frame was stated.
+        effects: what turns joints off from their commands; nothing beyond the joint angles that were measured.
     """
 
     robot: NominalRobot
@@ -31,18 +36,31 @@ class CalibratedModel:
     X_FE_nominal: Array
     base_is_given: bool = False
     tool_is_given: bool = False
+    effects: tuple[FittedTerm, ...] = ()
 
-    def flange_poses(self, q_rad: Array) -> Array:
+    def true_joints(self, q_rad: Array, payload_kg: Array | float = 0.0) -> Array:
+        """``(N, n)`` angles that the joints really take for commands ``(N, n)``, with a payload beyond the model's."""
+        q_rad = np.atleast_2d(q_rad)
+        if not self.effects:
+            return q_rad
+        from truepath.effects import joint_errors  # casadi takes a while to import and rigid models need none
+
+        return q_rad + joint_errors(self.robot, q_rad, self.effects, payload_kg)
+
+    def flange_poses(self, q_rad: Array, payload_kg: Array | float = 0.0) -> Array:
         """``(N, 4, 4)`` poses X_BF of the real flange in the real base for commanded joints ``(N, n)``."""
-        return poe.flange_poses(self.robot, self.p, q_rad)
+        return poe.flange_poses(self.robot, self.p, self.true_joints(q_rad, payload_kg))
 
     def flange_poses_and_jacobian(self, q_rad: Array) -> tuple[Array, Array]:
-        """The same and its Jacobian ``(N, 6, n)`` (angular, linear velocity of the flange origin, in B)."""
-        return poe.flange_poses_and_jacobian(self.robot, self.p, q_rad)
+        """The same and its Jacobian ``(N, 6, n)`` (angular, linear velocity of the flange origin, in B).
 
-    def predict(self, q_rad: Array) -> Array:
+        The Jacobian is that of the rigid robot at the true angles: effects change it by a few parts in a thousand.
+        """
+        return poe.flange_poses_and_jacobian(self.robot, self.p, self.true_joints(q_rad))
+
+    def predict(self, q_rad: Array, payload_kg: Array | float = 0.0) -> Array:
         """``(N, 4, 4)`` poses X_ME of the probe that a tracker would see."""
-        return self.X_MB @ self.flange_poses(q_rad) @ self.X_FE
+        return self.X_MB @ self.flange_poses(q_rad, payload_kg) @ self.X_FE
 
     def predict_nominal(self, q_rad: Array) -> Array:
         """``(N, 4, 4)`` poses X_ME of the probe if the robot were as its maker drew it."""

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from truepath import lie, poe
+from truepath.batched import BatchedFunction
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.robot import NominalRobot
@@ -88,33 +89,30 @@ class PoseProblem:
         self.robot, self.X_MB, self.X_FE = robot, X_MB, X_FE
         self.num_poses = len(measurements)
         self.components = 6 if measurements.has_orientation else 3
-        n, N = robot.num_joints, self.num_poses
-        # CasADi reads and writes these arrays in place: converting its matrices would take longer than the model.
+        n = robot.num_joints
         inputs = [np.zeros((4 * (n + 1), 3)), measurements.q_rad, measurements.p_ME]
         if measurements.R_ME is not None:
             inputs.append(np.swapaxes(measurements.R_ME, 1, 2))  # column-major, as CasADi wants it
-        inputs = [np.array(array, float, order="C") for array in inputs]
-        self._links = inputs[0]
-        self._residual, self._jacobian = np.empty((N, self.components)), np.empty((N, 5 * n + 12, self.components))
-        function = residual_function(n, measurements.has_orientation).map("residuals", "serial", N, [0], [])
-        self._buffer, self._trigger = function.buffer()
-        for index, array in enumerate(inputs):
-            self._buffer.set_arg(index, memoryview(array))
-        for index, array in enumerate((self._residual, self._jacobian)):
-            self._buffer.set_res(index, memoryview(array))
-        self._keep_alive = inputs
+        self._function = BatchedFunction(residual_function(n, measurements.has_orientation), inputs, common=(0,))
+        self._q_rad = measurements.q_rad
 
     def evaluate(self, p: Array) -> tuple[Array, Array]:
         """Residual ``(N, m)`` and Jacobian ``(N, m, 4 n + 12)``, m = 3 or 6, in m and rad."""
+        return self.evaluate_with_angles(p, np.zeros_like(self._q_rad))[:2]
+
+    def evaluate_with_angles(self, p: Array, joint_error_rad: Array) -> tuple[Array, Array, Array]:
+        """The same when joints stand off from their commands by ``(N, n)``, and the derivative ``(N, m, n)`` by that."""
         n = self.robot.num_joints
         axes = poe.calibrated_axes(self.robot, p)
         X_BE = self.robot.X_BF @ self.X_FE @ poe.frame_step(p[poe.tool_slice(n)])
         links = poe.link_transforms(axes, X_BE)
         links[0] = self.X_MB @ poe.frame_step(p[poe.base_slice(n)]) @ links[0]
-        self._links[:] = links[:, :3].transpose(0, 2, 1).reshape(-1, 3)
-        self._trigger()
-        local = np.swapaxes(self._jacobian[:, : 4 * n + 12], 1, 2)
-        return self._residual.copy(), local @ _twists_of_parameters(axes, p)
+        self._function.inputs[0][:] = links[:, :3].transpose(0, 2, 1).reshape(-1, 3)
+        self._function.inputs[1][:] = self._q_rad + joint_error_rad
+        residual, local = self._function()
+        local = np.swapaxes(local, 1, 2)
+        by_parameter = local[:, :, : 4 * n + 12] @ _twists_of_parameters(axes, p)
+        return residual[:, 0].copy(), by_parameter, local[:, :, 4 * n + 12 :].copy()
 
 
 def _twists_of_parameters(axes: Array, p: Array) -> Array:

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from truepath import frames
+import numpy as np
+
+from truepath import frames, lie
+from truepath.errors import CalibrationError
 from truepath.iso9283 import Accuracy, accuracy
+from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel, nominal_flange_poses
 
 SCHEMA = "truepath.validation/1"
+FEWEST_POSES = {3: 4, 6: 3}  # by readings a pose: fewer leave several placements that fit as well
+WORST_CONDITION = 100.0  # of the equations for the frames; good poses have 10, lengths being in metres
 
 
 @dataclass(frozen=True)
@@ -46,10 +52,12 @@ def refit_frames(model: CalibratedModel, measurements: Measurements) -> Calibrat
     Nominal frames are estimated anew from the same poses, so that the comparison stays fair.
 
     Raises:
-        CalibrationError: the poses fit neither robot, wherever it stands.
+        CalibrationError: too few or too similar poses, or they fit neither robot, wherever it stands.
     """
     p_ME, R_ME = measurements.p_ME, measurements.R_ME
+    _require_poses(measurements)
     X_MB, X_FE = frames.register(model.flange_poses(measurements.q_rad), p_ME, R_ME)
+    _require_variety(model.flange_poses(measurements.q_rad), X_FE, measurements.has_orientation)
     X_BF = nominal_flange_poses(model.robot, measurements.q_rad)
     X_MB_nominal, X_FE_nominal = frames.register(X_BF, p_ME, R_ME)
     return replace(
@@ -61,3 +69,28 @@ def refit_frames(model: CalibratedModel, measurements: Measurements) -> Calibrat
         base_is_given=False,
         tool_is_given=False,
     )
+
+
+def _require_poses(measurements: Measurements) -> None:
+    needed = FEWEST_POSES[6 if measurements.has_orientation else 3]
+    found = len(np.unique(np.round(measurements.q_rad, 6), axis=0))
+    if found < needed:
+        raise CalibrationError(
+            f"too few poses to find the frames again\n  expected: at least {needed} different poses\n  found:    {found}"
+        )
+
+
+def _require_variety(X_BF: Array, X_FE: Array, has_orientation: bool) -> None:
+    """The poses must tell a moved base from a moved probe: looks at the derivatives of the readings, in B."""
+    R, points = X_BF[:, :3, :3], (X_BF @ X_FE)[:, :3, 3]
+    same, none = np.broadcast_to(np.eye(3), R.shape), np.zeros(R.shape)
+    J = np.concatenate([-lie.skew(points), same, R], axis=2)  # turn and shift of the base, shift of the probe
+    if has_orientation:
+        turn = np.concatenate([same, none, none, R], axis=2)
+        J = np.concatenate([np.concatenate([J, none], axis=2), turn], axis=1)
+    condition = np.linalg.cond(J.reshape(-1, J.shape[2]))
+    if not condition <= WORST_CONDITION:
+        raise CalibrationError(
+            "the poses are too much alike to find the frames again\n  expected: joints that move, of wrist and arm\n"
+            f"  found:    equations of condition {condition:.3g}, more than {WORST_CONDITION:g}"
+        )

@@ -91,8 +91,14 @@ def main():
     parser.add_argument("--urdf", required=True, help="nominal robot")
     parser.add_argument("--train-rows", help="JSON list of rows to fit, 0 = first data line; the rest is held out")
     parser.add_argument("--ee-link", default="flange", help="link that carries the reflector (default: flange)")
-    parser.add_argument("--reflector-mm", type=float, nargs=3, default=(0.0, 0.0, 31.0), metavar=("X", "Y", "Z"),
-                        help="nominal reflector in that link (default: 0 0 31)")
+    parser.add_argument(
+        "--reflector-mm",
+        type=float,
+        nargs=3,
+        default=(0.0, 0.0, 31.0),
+        metavar=("X", "Y", "Z"),
+        help="nominal reflector in that link (default: 0 0 31)",
+    )
     parser.add_argument("--repeat", type=int, default=3, help="timed solves (default: 3)")
     args = parser.parse_args()
     if args.repeat < 1:
@@ -111,11 +117,11 @@ def main():
             return make_calibrator(robot, args.ee_link, reflector, joints[train], measured[train])
 
         nominal = errors_mm(fresh(), joints[train], measured[train])
-        np.random.seed(0)  # the package draws the basis of its axis corrections at random
+        np.random.seed(0)  # noqa: NPY002  the package draws the basis of its axis corrections at random
         fresh().solve(max_iterations=1)  # warm-up
         seconds = []
         for _ in range(args.repeat):
-            np.random.seed(0)
+            np.random.seed(0)  # noqa: NPY002
             calibrator = fresh()
             start = time.perf_counter()
             result = calibrator.solve()

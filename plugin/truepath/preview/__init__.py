@@ -87,7 +87,7 @@ def write_preview(
         )
     arm = read_arm(robot_source, robot, calibration.robot.name)
 
-    outside = ~calibration.region.region().contains(q_programmed)
+    outside = np.logical_not(calibration.region.region().contains(q_programmed))
     paths = Toolpaths.of(calibration.model, q_programmed, q_corrected)
     uncorrected, corrected = (ErrorStatistics.of(errors) for errors in paths.errors_mm())
     factor = nice_magnification(paths) if magnification == "auto" else _require_magnification(magnification)

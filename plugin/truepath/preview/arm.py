@@ -20,7 +20,7 @@ from truepath import lie, poe
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.preview.geometry import Y_TO_Z, rod
-from truepath.preview.model_files import find_urdf, mesh_file
+from truepath.model_files import find_urdf, mesh_file
 from truepath.robot import NominalRobot
 
 SAME_ROBOT_M = 1e-4
@@ -47,6 +47,12 @@ class Shape:
     X_AS: Array
     geometry: mg.Geometry
     rgba: Rgba
+
+    def corners(self) -> Array:
+        """``(8, 3)`` corners of a box around the shape, in the frame of the carrier."""
+        lower, upper = _bounds(self.geometry)
+        signs = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(8, 3)
+        return (lower + signs * (upper - lower)) @ self.X_AS[:3, :3].T + self.X_AS[:3, 3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +211,19 @@ class _ShapeLoader:
         return [(_triangles(mesh, scale), _mesh_colour(mesh)) for mesh in meshes]
 
 
+def _bounds(geometry: mg.Geometry) -> tuple[Array, Array]:
+    """Lowest and highest coordinates ``(3,)`` of a geometry in its own frame."""
+    if isinstance(geometry, mg.TriangularMeshGeometry):
+        return geometry.vertices.min(axis=0), geometry.vertices.max(axis=0)
+    if isinstance(geometry, mg.Box):
+        half = np.array(geometry.lengths) / 2
+    elif isinstance(geometry, mg.Cylinder):
+        half = np.array([geometry.radiusTop, geometry.height / 2, geometry.radiusTop])
+    else:
+        half = np.full(3, geometry.radius)
+    return -half, half
+
+
 def _triangles(mesh: trimesh.Trimesh, scale: Array) -> mg.TriangularMeshGeometry:
     if len(mesh.faces) <= MOST_FACES_TO_SMOOTH:
         mesh = trimesh.graph.smooth_shade(mesh, angle=CREASE_RAD)
@@ -214,7 +233,7 @@ def _triangles(mesh: trimesh.Trimesh, scale: Array) -> mg.TriangularMeshGeometry
 def _mesh_colour(mesh: trimesh.Trimesh) -> Rgba | None:
     material = getattr(mesh.visual, "material", None)
     colour = getattr(material, "main_color", None)
-    if colour is None and mesh.visual.defined:
+    if colour is None and getattr(mesh.visual, "defined", False):
         colour = getattr(mesh.visual, "main_color", None)
     if colour is None:
         return None

@@ -86,11 +86,12 @@ def render(text: PageText, recorded: scene.RecordedScene, frames: KeyFrames, lab
 
 def _panel(text: PageText) -> str:
     factor = f"{text.magnification:g}"
-    subtitle = f"{text.robot} · {_count(text.waypoints, 'waypoint')} · calibrated {text.calibrated_utc[:10]}"
+    facts = (text.robot, _count(text.waypoints, "waypoint"), f"calibrated {text.calibrated_utc[:10]}")
+    subtitle = " · ".join(f"<span>{escape(fact)}</span>" for fact in facts)
     drawn = f"error drawn {factor} times larger" if text.magnification != 1 else "error drawn in true size"
     legend = [
         _entry(
-            "band", scene.PROGRAMMED, 0.4, "Programmed path", "where the program wants the tool", scene.PATH_PROGRAMMED
+            "band", scene.PROGRAMMED, 0.5, "Programmed path", "where the program wants the tool", scene.PATH_PROGRAMMED
         ),
         _entry("swatch", scene.UNCORRECTED, 1, "Without correction", drawn, scene.PATH_UNCORRECTED, scene.ERROR_LINES),
         _entry("swatch", scene.CORRECTED, 1, "With correction", drawn, scene.PATH_CORRECTED),
@@ -98,22 +99,20 @@ def _panel(text: PageText) -> str:
         _entry("arm", scene.UNCORRECTED, 0.35, "Robot without correction", drawn, scene.GHOST),
     ]
     if text.outside:
-        at = f'<span class="band" style="background:{scene.OUTSIDE};opacity:.55"></span>'
-        legend.insert(1, f"<li><label>{at}<span>Outside the calibrated region</span></label></li>")
-    rows = "".join(
-        f"<tr><td>{name}</td><td>{getattr(text.uncorrected, key):.3f}</td><td>{getattr(text.corrected, key):.3f}</td></tr>"
-        for name, key in (("mean", "mean"), ("max", "max"))
-    )
+        swatch = f'<span class="band" style="background:{scene.OUTSIDE};opacity:.6"></span>'
+        legend.insert(1, f"<li><label>{swatch}<span>Outside the calibrated region</span></label></li>")
+    errors = (("mean", text.uncorrected.mean, text.corrected.mean), ("max", text.uncorrected.max, text.corrected.max))
+    rows = "".join(f"<tr><td>{name}</td><td>{a:.3f}</td><td>{b:.3f}</td></tr>" for name, a, b in errors)
     return f"""<main id="panel">
 <h1>{escape(text.title)}</h1>
-<p class="subtitle">{escape(subtitle)}</p>
-<p id="no-webgl" class="warning" hidden>This browser shows no 3D graphics (WebGL). The numbers below hold all the same.</p>
+<p class="subtitle">{subtitle}</p>
+<p id="no-webgl" class="warning" hidden>No 3D view: this browser has no WebGL. The numbers below hold all the same.</p>
 <noscript><p class="warning">The 3D view needs JavaScript. The numbers below hold all the same.</p></noscript>
 <ul class="legend">
 {"".join(legend)}
 </ul>
 <table>
-<thead><tr><th>Tool error, mm</th><th>without<br>correction</th><th>with<br>correction</th></tr></thead>
+<thead><tr><th>Predicted tool<br>error, mm</th><th>without<br>correction</th><th>with<br>correction</th></tr></thead>
 <tbody>{rows}</tbody>
 </table>
 <div id="playback">
@@ -130,7 +129,7 @@ def _entry(shape: str, colour: str, opacity: float, name: str, explanation: str,
     return (
         f'<li><label><span class="{shape}" style="background:{colour};opacity:{opacity:g}"></span>'
         f"<span>{escape(name)}{small}</span>"
-        f'<input type="checkbox" checked data-nodes="{" ".join(nodes)}" aria-label="Show: {escape(name)}"></label></li>\n'
+        f'<input type="checkbox" checked data-nodes="{" ".join(nodes)}"></label></li>\n'
     )
 
 
@@ -178,10 +177,9 @@ def _data(text: PageText, recorded: scene.RecordedScene, frames: KeyFrames, labe
 
 def _licences() -> str:
     """What the licences of meshcat's viewer and of the libraries in it want to travel with them."""
-    parts = [_meshcat("viewer/LICENSE")]
-    for library in json.loads(_meshcat("viewer/dist/main.min.js.THIRD_PARTY_LICENSES.json")):
-        parts.append(f"{library.get('name')}: {library.get('license')}\n{library.get('licenseText') or ''}")
-    return f"<pre>{escape(chr(10).join(parts))}</pre>"
+    libraries = json.loads(_meshcat("viewer/dist/main.min.js.THIRD_PARTY_LICENSES.json"))
+    texts = [f"{library['name']}: {library['license']}\n{library['licenseText'] or ''}" for library in libraries]
+    return "".join(f"<pre>{escape(text)}</pre>" for text in (_meshcat("viewer/LICENSE"), *texts))
 
 
 def _meshcat(path: str) -> str:

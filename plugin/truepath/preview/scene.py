@@ -29,8 +29,8 @@ GRID_COLOUR = "#b9c0c8"
 SKY, HORIZON = (1.0, 1.0, 1.0), (0.86, 0.89, 0.92)
 GHOST_OPACITY = 0.28
 GRID_CELL_M = 0.1
-MOST_ERROR_LINES = 120
-VIEW_POSTURES = 40
+MOST_ERROR_LINES = 66
+VIEW_POSTURES = 60
 VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD = np.radians(-55.0), np.radians(24.0)  # azimuth from where the path lies
 SHARED_BYTES = 200  # geometries from this size on are stored once, however often they are used
 
@@ -106,9 +106,10 @@ def record_scene(
     position = fine_positions(q_programmed)
     q_fine = interpolate(q_programmed, position), interpolate(q_corrected, position)
     paths = Toolpaths.of(model, *q_fine).magnified(magnification)
-    joints = np.concatenate([_joint_origins(arm, q) for q in (frames.q_corrected, frames.q_uncorrected)])
-    reach = float(np.linalg.norm(joints.reshape(-1, 3), axis=1).max())
-    size = max(reach, 0.1)
+    postures = np.concatenate([frames.q_corrected, frames.q_uncorrected])
+    postures = postures[np.linspace(0, len(postures) - 1, min(len(postures), VIEW_POSTURES)).astype(int)]
+    bodies = _occupied_points(arm, postures)
+    size = max(float(np.linalg.norm(bodies, axis=1).max()), 0.1)
 
     scene.surroundings(size)
     scene.paths(paths, outside[np.round(position).astype(int)], 0.002 * size)
@@ -122,11 +123,9 @@ def record_scene(
             _animate(animation, node, arm, frames.time_s, q)
         scene.root.set_animation(animation, play=True, repetitions=1_000_000)
 
-    shown = np.linspace(0, len(joints) - 1, VIEW_POSTURES).astype(int)
     lines = np.concatenate([paths.goal, paths.uncorrected, paths.corrected])
     lines = lines[np.linspace(0, len(lines) - 1, min(len(lines), 300)).astype(int)]
-    points = np.concatenate([np.zeros((1, 3)), joints[shown].reshape(-1, 3), lines])
-    recorded.view_points = points @ X_up[:3, :3].T
+    recorded.view_points = np.concatenate([bodies, lines]) @ X_up[:3, :3].T
     recorded.view_direction = _view_direction(X_up[:3, :3] @ paths.goal.mean(axis=0))
     return recorded
 
@@ -162,37 +161,38 @@ class _Scene:
     def surroundings(self, size: float) -> None:
         """Background, floor grid and the axes of the base frame, in place of what meshcat shows by itself."""
         window = self.root.window
-        for name, properties in {
-            "Background": {"top_color": SKY, "bottom_color": HORIZON},
-            "Grid": {"visible": False},
-            "Axes": {"visible": False},
-        }.items():
-            for key, value in properties.items():
-                Visualizer.view_into(window, ScenePath((name,))).set_property(key, value)
+        for name, key, value in (
+            ("Background", "top_color", SKY),
+            ("Background", "bottom_color", HORIZON),
+            ("Grid", "visible", False),
+            ("Axes", "visible", False),
+        ):
+            Visualizer.view_into(window, ScenePath((name,))).set_property(key, value)
         material = self.material(mg.LineBasicMaterial, _rgb(GRID_COLOUR), opacity=0.6)
         self.put(self.root["floor"], line_segments(*grid_lines(1.1 * size, GRID_CELL_M), material))
         for axis, (name, colour) in enumerate(zip("xyz", AXES, strict=True)):
             geometry, X = rod(np.zeros(3), 0.2 * size * np.eye(3)[axis], 0.003 * size)
-            thing = mg.Mesh(geometry, self.material(mg.MeshBasicMaterial, _rgb(colour)))
-            self.put(self.root["base_axes"][name], thing, X)
+            self.put(self.root["base_axes"][name], mg.Mesh(geometry, self.bright(colour)), X)
 
     def paths(self, paths: Toolpaths, outside: Array, radius: float) -> None:
         """The three lines. The programmed one is a wide pale band, so that the corrected one shows inside it."""
-        band = np.where(outside[:, None], _unit_rgb(OUTSIDE), _unit_rgb(PROGRAMMED))
-        pale: dict[str, Any] = {"vertexColors": True, "opacity": 0.38, "depthWrite": False}
-        for name, points, colours, width, colour, options in (
-            (PATH_PROGRAMMED, paths.goal, band, 2.6 * radius, 0xFFFFFF, pale),
-            (PATH_UNCORRECTED, paths.uncorrected, None, radius, _rgb(UNCORRECTED), {}),
-            (PATH_CORRECTED, paths.corrected, None, radius, _rgb(CORRECTED), {}),
-        ):
-            kept = thin_out(points)
-            geometry = tube(points[kept], width, None if colours is None else colours[kept])
-            material = self.material(mg.MeshBasicMaterial, colour, **options)
-            if geometry is None:  # a single point
-                geometry, material = mg.Sphere(2.0 * width), self.material(mg.MeshBasicMaterial, colour)
-                self.put(self.root[name], mg.Mesh(geometry, material), lie.make_pose(translation=points[0]))
-            else:
-                self.put(self.root[name], mg.Mesh(geometry, material))
+        shades = np.where(outside[:, None], _unit_rgb(OUTSIDE), _unit_rgb(PROGRAMMED))
+        far_walls_only = {"side": 1, "depthWrite": False}  # 1: back side, of three.js
+        band = self.material(mg.MeshBasicMaterial, 0xFFFFFF, vertexColors=True, opacity=0.5, **far_walls_only)
+        self.line(PATH_PROGRAMMED, paths.goal, 2.8 * radius, band, shades)
+        self.line(PATH_UNCORRECTED, paths.uncorrected, radius, self.bright(UNCORRECTED))
+        self.line(PATH_CORRECTED, paths.corrected, radius, self.bright(CORRECTED))
+
+    def line(self, name: str, points: Array, radius: float, material: mg.Material, shades: Array | None = None) -> None:
+        """A tube through points ``(K, 3)``, each with its own shade ``(K, 3)`` if so wished."""
+        kept = thin_out(points)
+        geometry = tube(points[kept], radius, None if shades is None else shades[kept])
+        if geometry is not None:  # a path that stays in one point has no line; the arms show it
+            self.put(self.root[name], mg.Mesh(geometry, material))
+
+    def bright(self, colour: str) -> mg.Material:
+        """A colour that no light changes, so that it is that of the legend."""
+        return self.material(mg.MeshBasicMaterial, _rgb(colour))
 
     def error_lines(self, at_waypoints: Toolpaths) -> None:
         """Thin lines from where the tool should be to where it would be."""
@@ -215,8 +215,8 @@ class _Scene:
                 self.put(carriers[shape.carrier][f"shape_{k}"], mg.Mesh(shape.geometry, material), shape.X_AS)
         X_AF = arm.link_transforms[-1]
         p_AE = X_AF[:3, :3] @ p_FE + X_AF[:3, 3]
-        bright = self.material(mg.MeshBasicMaterial, _rgb(colour))
-        self.put(carriers[-1]["tool_point"], mg.Mesh(mg.Sphere(0.008 * size), bright), lie.make_pose(translation=p_AE))
+        bright = self.bright(colour)
+        self.put(carriers[-1]["tool_point"], mg.Mesh(mg.Sphere(0.009 * size), bright), lie.make_pose(translation=p_AE))
         if np.linalg.norm(p_FE) > 1e-3:
             geometry, X = rod(X_AF[:3, 3], p_AE, 0.003 * size)
             self.put(carriers[-1]["tool"], mg.Mesh(geometry, bright), X)
@@ -246,14 +246,16 @@ def _joint_transforms(arm: Arm, q_rad: Array) -> Array:
     return arm.link_transforms[:-1] @ rotation_about_axis(np.eye(4), q_rad.reshape(-1)).reshape(*q_rad.shape, 4, 4)
 
 
-def _joint_origins(arm: Arm, q_rad: Array) -> Array:
-    """``(K, n + 1, 3)`` origins of the axis frames and of the flange in B for joints ``(K, n)``."""
-    transforms = np.moveaxis(_joint_transforms(arm, q_rad), -3, 0)
-    X, origins = np.broadcast_to(np.eye(4), (len(q_rad), 4, 4)), []
-    for step in (*transforms, arm.link_transforms[-1]):
-        X = X @ step
-        origins.append(X[:, :3, 3])
-    return np.stack(origins, axis=1)
+def _occupied_points(arm: Arm, q_rad: Array) -> Array:
+    """``(P, 3)`` corners in B of boxes around the base, the links and the flange for joints ``(K, n)``."""
+    X_BA, points = np.broadcast_to(np.eye(4), (len(q_rad), 4, 4)), []
+    for carrier, step in enumerate((None, *np.moveaxis(_joint_transforms(arm, q_rad), 1, 0))):
+        X_BA = X_BA if step is None else X_BA @ step
+        corners = [shape.corners() for shape in arm.shapes if shape.carrier == carrier]
+        local = np.concatenate([np.zeros((1, 3)), *corners])
+        box = np.stack(np.meshgrid(*np.stack([local.min(axis=0), local.max(axis=0)], axis=1)), axis=-1).reshape(-1, 3)
+        points.append((box @ np.swapaxes(X_BA[:, :3, :3], 1, 2) + X_BA[:, None, :3, 3]).reshape(-1, 3))
+    return np.concatenate(points)
 
 
 def _animate(animation: Animation, node: Visualizer, arm: Arm, time_s: Array, q_rad: Array) -> None:

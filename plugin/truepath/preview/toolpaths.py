@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truepath import lie
 from truepath.lie import Array
@@ -22,7 +23,7 @@ FRAMES_PER_SECOND = 30
 MAX_KEY_FRAMES = 400
 SHORTEST_S, LONGEST_S = 6.0, 40.0
 JOINT_SPEED_RAD_S = 0.6
-DRAWN_ERROR_SHARE = 0.08  # of the path's size, for the automatic magnification
+DRAWN_ERROR_SHARE = 0.09  # of what is seen, for the automatic magnification
 NICE_FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 
@@ -43,13 +44,13 @@ class Toolpaths:
     @classmethod
     def of(cls, model: CalibratedModel, q_programmed: Array, q_corrected: Array) -> Toolpaths:
         """Tool points for joints ``(K, n)``."""
-        parts: list[tuple[Array, Array, Array]] = []
+        points = np.empty((3, len(q_programmed), 3))
         for k in range(0, len(q_programmed), CHUNK):
-            programmed, corrected = q_programmed[k : k + CHUNK], q_corrected[k : k + CHUNK]
-            X_BF_goal = model.goal_flange_poses(nominal_flange_poses(model.robot, programmed))
-            X_BF = (X_BF_goal, model.flange_poses(programmed), model.flange_poses(corrected))
-            parts.append(tuple((X @ model.X_FE)[:, :3, 3] for X in X_BF))  # type: ignore[arg-type]
-        return cls(*(np.concatenate(points) for points in zip(*parts, strict=True)))
+            part = slice(k, k + CHUNK)
+            X_BF_goal = model.goal_flange_poses(nominal_flange_poses(model.robot, q_programmed[part]))
+            X_BF = (X_BF_goal, model.flange_poses(q_programmed[part]), model.flange_poses(q_corrected[part]))
+            points[:, part] = [(X @ model.X_FE)[:, :3, 3] for X in X_BF]
+        return cls(*points)
 
     def errors_mm(self) -> tuple[Array, Array]:
         """``(K,)`` distances from the goal without and with correction, mm."""
@@ -104,7 +105,7 @@ def interpolate(q_rad: Array, position: Array) -> Array:
     return q_rad[before] * (1.0 - share) + q_rad[after] * share
 
 
-def thin_out(points: Array, limit: int = LINE_LIMIT) -> Array:
+def thin_out(points: Array, limit: int = LINE_LIMIT) -> NDArray[np.int64]:
     """Indices of at most ``limit`` of the points ``(K, 3)`` whose line looks like the line through all.
 
     Of each block of neighbours the first is kept, and the one that lies furthest from the chord: corners stay.
@@ -125,10 +126,11 @@ def thin_out(points: Array, limit: int = LINE_LIMIT) -> Array:
 
 
 def nice_magnification(paths: Toolpaths) -> float:
-    """The round factor that makes the usual error a visible part of the path, without drowning the path in it."""
-    size = float(np.linalg.norm(np.ptp(paths.goal, axis=0)))
+    """The round factor that makes the usual error well visible beside the arm and the path."""
+    reach = float(np.linalg.norm(paths.goal, axis=1).max())
+    size = max(reach, float(np.linalg.norm(np.ptp(paths.goal, axis=0))))
     error = float(np.quantile(np.linalg.norm(paths.uncorrected - paths.goal, axis=1), 0.95))
-    wanted = DRAWN_ERROR_SHARE * max(size, 0.1) / max(error, 1e-9)
+    wanted = DRAWN_ERROR_SHARE * size / max(error, 1e-9)
     return max((factor for factor in NICE_FACTORS if factor <= wanted), default=1.0)
 
 

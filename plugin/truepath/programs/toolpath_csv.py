@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,7 +37,7 @@ class Toolpath:
     radians_per_unit: float
 
     def with_joints(self, q_rad: Array) -> str:
-        """The text of the file with these joints ``(N, n)``; every other cell is kept, line ends too."""
+        """The text of the file with these joints ``(N, n)``; all else is kept: other cells, line ends, byte-order mark."""
         header = list(self.table.header)
         added = [name for name in self.joint_columns if name not in header]
         place = {name: index for index, name in enumerate([*header, *added])}
@@ -49,6 +51,8 @@ class Toolpath:
                 row[column] = str(cell)
             rows.append(row)
         out = io.StringIO(newline="")
+        if self.table.raw.startswith(codecs.BOM_UTF8):
+            out.write("\ufeff")
         writer = csv.writer(out, lineterminator="\r\n" if b"\r\n" in self.table.raw else "\n")
         writer.writerow([*header, *added])
         writer.writerows(rows)
@@ -65,6 +69,16 @@ def read_toolpath(path: str | Path, num_joints: int) -> Toolpath:
     """
     table = read_table(path)
     joints = [f"q{i + 1}" for i in range(num_joints)]
+    for name in table.header:
+        match = re.fullmatch(r"(q\d+)_(rad|deg)", name)
+        if match and match[1] not in joints:
+            raise InputError(
+                "a column for a joint that the robot does not have",
+                file=table.file,
+                line=1,
+                column=name,
+                expected=f"q1 to q{num_joints}",
+            )
     if any(f"{joint}_{unit}" in table.header for joint in joints for unit in ANGLE_UNITS):
         names, factor = unit_columns(table, joints, ANGLE_UNITS)
         return Toolpath(table, table.numbers(names) * factor, None, names, factor)

@@ -43,12 +43,14 @@ class RealRobot:
         imperfection: their sizes.
 
     Raises:
-        InputError: the cell has no reflector.
+        InputError: the cell has no reflector, or the seed is negative.
     """
 
     def __init__(self, spec: str | Path, seed: int, imperfection: Imperfection | None = None) -> None:
         from pydrake.systems.framework import DiagramBuilder
 
+        if seed < 0:
+            raise InputError("a seed cannot be negative", found=str(seed))
         self.spec = plants.cell_of(spec)
         builder = DiagramBuilder()
         self.plant, self._scene_graph = plants.add_cell(builder, self.spec)

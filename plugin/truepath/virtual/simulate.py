@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -36,6 +37,15 @@ class Campaign:
     repeats: int = 1
     tracker: bool = False
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        if min(self.poses, self.repeats) < 1:
+            raise InputError("a campaign without poses", expected="one pose and one visit of it, or more")
+        for noise in (self.noise_mm, self.orientation_noise_mrad or 0.0):
+            if not (math.isfinite(noise) and noise >= 0):
+                raise InputError("this is no size of noise", expected="0 or a finite positive number", found=str(noise))
+        if self.seed < 0:
+            raise InputError("a seed cannot be negative", found=str(self.seed))
 
 
 def free_poses(real: RealRobot, count: int, rng: np.random.Generator) -> Array:

@@ -74,7 +74,7 @@ class _DirectivesLoader(yaml.SafeLoader):
     """Plain YAML; Drake's own tags (!Rpy, !AngleAxis, ...) carry poses, which do not matter here."""
 
 
-_DirectivesLoader.add_multi_constructor("!", lambda loader, tag, node: None)  # type: ignore[no-untyped-call]
+_DirectivesLoader.add_multi_constructor("!", lambda loader, tag, node: None)
 
 
 def _locate(uri: str, beside: Path) -> Path | None:

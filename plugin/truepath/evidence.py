@@ -1,0 +1,148 @@
+"""Linear regression with several noises and with parameter sizes that are learnt from the data.
+
+Parameters come in groups; each group has a Gaussian prior about zero whose width is found by maximising the
+marginal likelihood (MacKay 1992). Groups that the data has no use for shrink to nothing by themselves, so
+that hundreds of waves can be offered and only the real ones are taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotri
+
+from truepath.errors import CalibrationError
+from truepath.lie import Array
+
+MAX_ITERATIONS = 30
+SETTLED = 0.05  # relative change of every size that matters
+IRRELEVANT = 0.05  # of its plausible size: whatever such a group still does, it does not matter
+VANISHED = 1e-3  # of its plausible size: smaller is not followed
+
+
+@dataclass(frozen=True)
+class LinearProblem:
+    """y = A x + noise, reduced to what inference needs.
+
+    Attributes:
+        H: one ``(k, k)`` matrix A^T A per kind of reading (position, orientation).
+        g: one ``(k,)`` vector A^T y per kind.
+        yy: one number y^T y per kind.
+        count: number of readings per kind.
+    """
+
+    H: list[Array]
+    g: list[Array]
+    yy: list[float]
+    count: list[int]
+
+    @classmethod
+    def of(cls, A: Array, y: Array) -> LinearProblem:
+        """From A ``(N, m, k)`` and y ``(N, m)``; m is 3 or 6, three readings of a kind."""
+        H, g, yy, count = [], [], [], []
+        for first in range(0, y.shape[1], 3):
+            rows, readings = A[:, first : first + 3].reshape(-1, A.shape[2]), y[:, first : first + 3].ravel()
+            H.append(rows.T @ rows)
+            g.append(rows.T @ readings)
+            yy.append(float(readings @ readings))
+            count.append(len(readings))
+        return cls(H, g, yy, count)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the data says.
+
+    Attributes:
+        x: ``(k,)`` mean.
+        covariance: ``(k, k)``.
+        sigma: noise per kind of reading.
+        size: ``(groups,)`` learnt prior width of each group.
+        log_evidence: logarithm of the marginal likelihood, less half the logarithm of the number of
+            readings for each learnt size (Schwarz 1978), so that sizes have to earn their keep.
+    """
+
+    x: Array
+    covariance: Array
+    sigma: list[float]
+    size: Array
+    log_evidence: float
+
+
+def infer(
+    problem: LinearProblem,
+    group: Array,
+    plausible: Array,
+    fixed_sigma: Array,
+    sigma: list[float],
+    size: Array | None = None,
+) -> Posterior:
+    """Finds parameters, noises and group sizes together.
+
+    Args:
+        problem: the data.
+        group: ``(k,)`` group number of each parameter, -1 for those with a fixed prior.
+        plausible: ``(groups,)`` plausible sizes.
+        fixed_sigma: ``(k,)`` prior width of parameters without a group; it must be finite.
+        sigma: noise per kind of reading to start from.
+        size: ``(groups,)`` sizes to start from, if not the plausible ones.
+    """
+    size, sigma = (plausible if size is None else size).copy(), list(sigma)
+    grouped = group >= 0
+    for _ in range(MAX_ITERATIONS):
+        precision = fixed_sigma**-2.0
+        precision[grouped] = size[group[grouped]] ** -2.0
+        x, covariance, log_det = _solve(problem, precision, sigma)
+        known = 1.0 - precision * np.diag(covariance)  # how far the data, not the prior, determines each
+        new_size = size.copy()
+        if grouped.any():
+            squares = np.bincount(group[grouped], x[grouped] ** 2, len(size))
+            weight = np.bincount(group[grouped], known[grouped], len(size))
+            new_size = np.sqrt(squares / np.maximum(weight, 1e-6))
+        new_size = np.clip(new_size, VANISHED * plausible, 1e3 * plausible)
+        new_sigma = [_noise(problem, kind, x, covariance, sigma[kind]) for kind in range(len(sigma))]
+        matters = np.maximum(size, new_size) > IRRELEVANT * plausible
+        changes = np.concatenate([new_size[matters] / size[matters], np.divide(new_sigma, sigma)])
+        size, sigma = new_size, new_sigma
+        if np.abs(np.log(changes)).max() < SETTLED:
+            break
+    precision = fixed_sigma**-2.0
+    precision[grouped] = size[group[grouped]] ** -2.0
+    x, covariance, log_det = _solve(problem, precision, sigma)
+    alive = int(np.sum(size > IRRELEVANT * plausible))
+    return Posterior(x, covariance, sigma, size, _log_evidence(problem, x, precision, log_det, sigma, alive))
+
+
+def _solve(problem: LinearProblem, precision: Array, sigma: list[float]) -> tuple[Array, Array, float]:
+    """Mean, covariance and log determinant of the posterior precision, in scaled coordinates for stability."""
+    H = sum((H / s**2 for H, s in zip(problem.H, sigma, strict=True)), np.zeros_like(problem.H[0]))
+    g = sum((g / s**2 for g, s in zip(problem.g, sigma, strict=True)), np.zeros_like(problem.g[0]))
+    total = np.diag(H) + precision
+    scale = total**-0.5
+    factor, failed = dpotrf(scale[:, None] * (H + np.diag(precision)) * scale, lower=True)
+    if failed:
+        raise CalibrationError("the effects cannot be told apart numerically")
+    inverse = dpotri(factor, lower=True)[0]
+    covariance = scale[:, None] * (np.tril(inverse) + np.tril(inverse, -1).T) * scale
+    log_det = 2.0 * float(np.sum(np.log(np.diag(factor)))) + float(np.sum(np.log(total)))
+    return covariance @ g, covariance, log_det
+
+
+def _squares(problem: LinearProblem, kind: int, x: Array) -> float:
+    return max(problem.yy[kind] - 2.0 * float(problem.g[kind] @ x) + float(x @ problem.H[kind] @ x), 1e-300)
+
+
+def _noise(problem: LinearProblem, kind: int, x: Array, covariance: Array, sigma: float) -> float:
+    spent = float(np.sum(covariance * problem.H[kind])) / sigma**2
+    return float(np.sqrt(_squares(problem, kind, x) / max(problem.count[kind] - spent, 1.0)))
+
+
+def _log_evidence(
+    problem: LinearProblem, x: Array, precision: Array, log_det: float, sigma: list[float], sizes: int
+) -> float:
+    fit = sum(_squares(problem, kind, x) / s**2 for kind, s in enumerate(sigma)) + float(np.sum(precision * x**2))
+    spread = sum(2.0 * n * np.log(s) for n, s in zip(problem.count, sigma, strict=True))
+    constant = sum(problem.count) * np.log(2 * np.pi)
+    penalty = sizes * np.log(sum(problem.count))
+    return float(-0.5 * (fit + spread + constant + log_det - np.sum(np.log(precision)) + penalty))

@@ -1,0 +1,299 @@
+"""Compares truepath with other packages on the same data, in the same run, and prints a table with ratios.
+
+    .venv/bin/python workflows/benchmark.py [--rounds 5] [--json]
+
+Kinematic solve: all 800 measured UR5 poses (Jacobi 2025), truepath against the package robotkinecal. Each
+runs in a process of its own, the two in turn; the time is that of the solve alone, without imports and
+reading, after one untimed run. Accuracy is compared on splits 80/20 that both get as row numbers: with
+five rounds every pose is held out once.
+
+Correction: a welding path of 10,000 waypoints corrected at once, against Drake's InverseKinematics for a
+sample of the same waypoints one by one, on a plant context with the same calibrated frames.
+
+Every process is held to one thread of linear algebra: on small matrices a second one only waits when the
+machine is busy. A ratio is peer / truepath: above 1, truepath is better. What is absent, peer or data, is skipped
+and named. Accuracy counts as equal within half a micrometre: the peer fits two parameters more, which this
+data hardly determines, so that it is a hair closer on the poses it was fitted to.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SCHEMA = "truepath.benchmark/1"
+ROOT = Path(__file__).resolve().parents[1]
+PEER_SCRIPT = ROOT / "workflows" / "peers" / "robotkinecal_solve.py"
+URDF = ROOT / "models" / "ur5" / "ur5.urdf"
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
+SPEEDUP_REQUIRED = 20.0
+TIE_MM = 0.0005  # a thirtieth of the tracker's own error
+FOLDS = 5
+IK_TOLERANCE_M, FLANGE_POINTS = 1e-6, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=FOLDS, help=f"1 to {FOLDS}; each takes about 20 s")
+    parser.add_argument("--repeat", type=int, default=1, help="timed solves per process and round")
+    parser.add_argument("--waypoints", type=int, default=10_000)
+    parser.add_argument("--sample", type=int, default=100, help="waypoints that Drake solves")
+    parser.add_argument("--peers", type=Path, default=ROOT / ".venv-peers", help="virtual environment of the peers")
+    parser.add_argument("--json", action="store_true", help="print JSON for machines instead of a table")
+    # For the processes that this script starts, as for the peer's script:
+    parser.add_argument("--solve-ours", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--correct-ours", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--csv", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--train-rows", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.rounds > FOLDS or min(options.rounds, options.repeat, options.sample, options.waypoints) < 1:
+        parser.error(f"--rounds must be 1 to {FOLDS}, the other numbers at least 1")
+    if options.solve_ours:
+        print(json.dumps(solve_ours(options.csv, options.train_rows, options.repeat)))
+    elif options.correct_ours:
+        print(json.dumps(correct_ours(options.waypoints, options.sample, options.repeat)))
+    else:
+        report = compare(options)
+        print(json.dumps(report, indent=1, allow_nan=False)) if options.json else print_table(report)
+    return 0
+
+
+def compare(options: argparse.Namespace) -> dict[str, Any]:
+    """Runs everything that can be run here; the report."""
+    rows: list[dict] = []
+    skipped: list[str] = []
+    details: dict[str, Any] = {}
+    load = os.getloadavg()[0]
+    data = Path(os.environ.get("TRUEPATH_DATA") or ROOT.parent / "shared" / "data")
+    csv, peer_python = data / "ur5_jacobi2025" / "grid.csv", options.peers / "bin" / "python"
+    if not csv.is_file():
+        skipped.append(f"kinematic solve: no {csv}; set TRUEPATH_DATA to the folder of the published data sets")
+    else:
+        if not peer_python.exists():
+            skipped.append(f"robotkinecal: no environment in {options.peers}; `make bench` creates it")
+        ours, peer = _solve_rounds(csv, peer_python, options, skipped)
+        rows += _solve_rows(ours, peer)
+        details["solve"] = {"truepath": ours, "robotkinecal": peer}
+    _say("correction")
+    script = [sys.executable, str(Path(__file__).resolve()), "--correct-ours"]
+    script += ["--repeat", "3", "--waypoints", str(options.waypoints), "--sample", str(options.sample)]
+    details["correction"] = _run(script)
+    rows += _correction_rows(details["correction"])
+    machine = {"cpus": os.cpu_count(), "load_at_start": load}
+    return {"schema": SCHEMA, "machine": machine, "rows": rows, "skipped": skipped, "details": details}
+
+
+def _solve_rounds(
+    csv: Path, peer_python: Path, options: argparse.Namespace, skipped: list[str]
+) -> tuple[list[dict], list[dict]]:
+    """Per round, what truepath and the peer say about all poses (time) and about one split (accuracy)."""
+    ours_script = [sys.executable, str(Path(__file__).resolve()), "--solve-ours", "--csv", str(csv)]
+    peer_script = [str(peer_python), str(PEER_SCRIPT), "--urdf", str(URDF), "--csv", str(csv)]
+    ours: list[dict] = []
+    peer: list[dict] = []
+    with csv.open(encoding="utf-8") as file:
+        order = np.random.default_rng(0).permutation(sum(1 for line in file if line.strip()) - 1)
+    with tempfile.TemporaryDirectory() as folder:
+        rows = Path(folder) / "rows.json"
+        for number in range(options.rounds):
+            _say(f"kinematic solve, round {number + 1} of {options.rounds}")
+            rows.write_text(json.dumps(sorted(int(k) for k in np.delete(order, slice(number, None, FOLDS)))))
+            ours.append(_whole_and_split(ours_script, rows, options.repeat))
+            if len(peer) == number and peer_python.exists():
+                try:
+                    peer.append(_whole_and_split(peer_script, rows, options.repeat))
+                except RuntimeError as error:
+                    skipped.append(f"robotkinecal: {error}")
+    return ours, peer if len(peer) == len(ours) else []
+
+
+def _whole_and_split(script: list[str], train_rows: Path, repeat: int) -> dict[str, dict]:
+    whole = _run([*script, "--repeat", str(repeat)])
+    return {"whole": whole, "split": _run([*script, "--repeat", "1", "--train-rows", str(train_rows)])}
+
+
+def _row(what: str, unit: str, ours: float, peer_name: str, peer: float | None, **more: Any) -> dict[str, Any]:
+    """One line of the table; ``required`` and ``met`` where there is a requirement."""
+    ratio = None if peer is None else peer / ours
+    row = {"what": what, "unit": unit, "truepath": ours, "peer": peer, "peer_name": peer_name, "ratio": ratio}
+    return {**row, "required": "", "met": None, **more}
+
+
+def _solve_rows(ours: list[dict], peer: list[dict]) -> list[dict]:
+    def typical(results: list[dict], part: str, key: str) -> float | None:
+        pick = statistics.median if key == "solve_s" else statistics.mean
+        return pick(result[part][key] for result in results) if results else None
+
+    ratio = met = None
+    if peer:
+        pairs = zip(ours, peer, strict=True)
+        ratio = statistics.median(b["whole"]["solve_s"] / a["whole"]["solve_s"] for a, b in pairs)
+        met = ratio >= SPEEDUP_REQUIRED
+    seconds, theirs = (typical(results, "whole", "solve_s") for results in (ours, peer))
+    assert seconds is not None
+    what, required = f"kinematic solve, {ours[0]['whole']['poses']} poses", f"ratio >= {SPEEDUP_REQUIRED:g}"
+    rows = [_row(what, "s", seconds, "robotkinecal", theirs, ratio=ratio, required=required, met=met)]
+    for what, key in (("in the fit (80 %)", "train_mean_mm"), ("held out (20 %)", "heldout_mean_mm")):
+        mine, other = (typical(results, "split", key) for results in (ours, peer))
+        assert mine is not None
+        met, required = None if other is None else mine <= other + TIE_MM, f"<= peer + {TIE_MM:g}"
+        rows.append(_row(f"mean error, poses {what}", "mm", mine, "robotkinecal", other, required=required, met=met))
+    return rows
+
+
+def _correction_rows(result: dict[str, Any]) -> list[dict]:
+    what, peer = f"correction, {result['waypoints']} waypoints", "Drake IK"
+    return [
+        _row(f"{what}, time for each", "us", result["per_waypoint_us"], peer, result["ik_per_waypoint_us"]),
+        _row(f"{what}, worst error left", "um", result["max_error_um"], peer, result["ik_max_error_um"], ratio=None),
+    ]
+
+
+def solve_ours(csv: Path, train_rows: Path | None, repeat: int) -> dict[str, Any]:
+    """What ``robotkinecal_solve.py`` prints, for truepath."""
+    from truepath.calibrate import calibrate
+    from truepath.plants import load_robot
+    from truepath.readers import read_measurements
+
+    robot = load_robot(URDF)
+    measurements = read_measurements(csv, robot, "jacobi2025")
+    train = np.arange(len(measurements)) if train_rows is None else np.array(json.loads(train_rows.read_text()))
+    heldout, known = np.setdiff1d(np.arange(len(measurements)), train), measurements.subset(train)
+    calibrate(robot, known)  # warm-up: builds the CasADi function
+    seconds = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        fit = calibrate(robot, known)
+        seconds.append(time.perf_counter() - start)
+    errors_mm = 1e3 * np.linalg.norm(fit.model.predict(measurements.q_rad)[:, :3, 3] - measurements.p_ME, axis=1)
+    report: dict[str, Any] = {
+        "poses": len(train),
+        "solve_s": statistics.median(seconds),
+        "solve_s_all": seconds,
+        "iterations": fit.iterations,
+        "train_mean_mm": float(errors_mm[train].mean()),
+        "parameters": len(fit.names) - len(fit.held),
+    }
+    if len(heldout):
+        report |= {"heldout_poses": len(heldout), "heldout_mean_mm": float(errors_mm[heldout].mean())}
+    return report
+
+
+def correct_ours(waypoints: int, sample: int, repeat: int) -> dict[str, Any]:
+    """A welding path corrected by truepath and, in part, by Drake's inverse kinematics."""
+    from truepath import lie, plants
+    from truepath.calibrate import calibrate
+    from truepath.correct import correct
+    from truepath.model import nominal_flange_poses
+    from truepath.programs.toolpath_csv import read_toolpath
+    from truepath.virtual.real_robot import RealRobot
+    from truepath.virtual.simulate import Campaign, free_poses, measure
+
+    robot, real = plants.load_robot("ur5_cell"), RealRobot("ur5_cell", seed=0)
+    model = calibrate(robot, measure(real, free_poses(real, 100, np.random.default_rng(0)), Campaign())).model
+    q_path = read_toolpath(plants.models_dir() / "ur5" / "weld_path.csv", robot.num_joints).q_rad
+    assert q_path is not None
+    along = np.linspace(0, len(q_path) - 1, waypoints)
+    q = np.stack([np.interp(along, np.arange(len(q_path)), column) for column in q_path.T], axis=1)
+    seconds, corrected = [], correct(model, q)  # the first one is the warm-up
+    for _ in range(repeat):
+        start = time.perf_counter()
+        corrected = correct(model, q)
+        seconds.append(time.perf_counter() - start)
+    goal = model.goal_flange_poses(nominal_flange_poses(robot, q))
+    picked = np.unique(np.linspace(0, waypoints - 1, sample).astype(int))
+    q_drake, ik_seconds, solved = _drake_ik(model, goal[picked], q[picked])
+
+    def largest_error_um(q_rad: np.ndarray) -> float:
+        return 1e6 * float(np.linalg.norm(lie.pose_error(goal[picked], model.flange_poses(q_rad))[:, 3:], axis=1).max())
+
+    return {
+        "waypoints": waypoints,
+        "per_waypoint_us": 1e6 * statistics.median(seconds) / waypoints,
+        "max_error_um": largest_error_um(corrected.q_rad[picked]),
+        "ik_waypoints": len(picked),
+        "ik_solved": solved,
+        "ik_per_waypoint_us": 1e6 * statistics.median(ik_seconds),
+        "ik_max_error_um": largest_error_um(q_drake),
+    }
+
+
+def _drake_ik(model: Any, X_BF: np.ndarray, q_start: np.ndarray) -> tuple[np.ndarray, list[float], int]:
+    """Joints, seconds per waypoint and number of successes of Drake's InverseKinematics from the programmed joints.
+
+    A pose is asked for as the places of three points of the flange: with an orientation constraint, SNOPT
+    stops at 1.4 mrad and takes longer.
+    """
+    from pydrake.multibody.inverse_kinematics import InverseKinematics
+    from pydrake.solvers import Solve
+    from truepath import plants
+    from truepath.export import set_calibrated_frames
+
+    plant = plants.load_plant("ur5_cell")
+    context = plant.CreateDefaultContext()
+    set_calibrated_frames(model, plant, context)
+    base, flange = plant.GetFrameByName("base_link"), plant.GetFrameByName("flange")
+    joints, seconds, solved = np.empty_like(q_start), [], 0
+    for k, (X, q) in enumerate(zip(X_BF, q_start, strict=True)):
+        start = time.perf_counter()
+        ik = InverseKinematics(plant, context)
+        for point in FLANGE_POINTS:
+            goal = X[:3, :3] @ point + X[:3, 3]
+            ik.AddPositionConstraint(flange, point, base, goal - IK_TOLERANCE_M, goal + IK_TOLERANCE_M)
+        ik.prog().SetInitialGuess(ik.q(), q)
+        result = Solve(ik.prog())
+        joints[k] = result.GetSolution(ik.q())
+        seconds.append(time.perf_counter() - start)
+        solved += int(result.is_success())
+    return joints, seconds, solved
+
+
+def _run(command: list[str]) -> dict[str, Any]:
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **ONE_THREAD}, timeout=600)
+    try:
+        return json.loads(done.stdout.strip().splitlines()[-1])
+    except (ValueError, IndexError):
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise RuntimeError(f"{Path(command[1]).name} failed with exit code {done.returncode}: {last}") from None
+
+
+def print_table(report: dict[str, Any]) -> None:
+    """The report for people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{value:.5g}"
+
+    table = Table(title="ratio = peer / truepath: above 1, truepath is better", title_justify="left")
+    for name in ("", "unit", "truepath", "peer", " ", "ratio", "required", "met"):
+        table.add_column(name, justify="right" if name in ("truepath", "peer", "ratio") else "left")
+    for row in report["rows"]:
+        met = {None: "", True: "yes", False: "no"}[row["met"]]
+        cells = (number(row["truepath"]), number(row["peer"]), row["peer_name"], number(row["ratio"]))
+        table.add_row(row["what"], row["unit"], *cells, row["required"], met)
+    console, machine = Console(highlight=False, width=140), report["machine"]
+    console.print(table)
+    busy = " (busy when this began: only ratios count)" if machine["load_at_start"] > machine["cpus"] / 2 else ""
+    console.print(f"{machine['cpus']} CPUs{busy}, one thread each")
+    for message in report["skipped"]:
+        console.print(f"skipped: {message}", markup=False)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
