@@ -79,6 +79,17 @@ def test_a_base_turned_by_exactly_half_a_turn_or_not_at_all_is_no_trap(seven, ha
     np.testing.assert_allclose(X_FE, setup.X_FE, atol=1e-6)
 
 
+def test_poses_in_one_plane_are_placed_and_never_mirrored(ur5, has_orientation):
+    setup = Setup(ur5, 5, has_orientation, poses=30)
+    setup.q[:, [0, 4, 5]] = 0.3  # only the parallel axes move
+    setup.X_BF = nominal_flange_poses(ur5, setup.q)
+    setup.X_ME = setup.X_MB @ setup.X_BF @ setup.X_FE
+    setup.p_ME, setup.R_ME = setup.X_ME[:, :3, 3], setup.X_ME[:, :3, :3] if has_orientation else None
+    X_MB, X_FE = setup.register()
+    assert np.linalg.det(X_MB[:3, :3]) == pytest.approx(1)
+    assert setup.worst_mm(X_MB, X_FE) < 1e-3
+
+
 @pytest.mark.parametrize("which", ["X_MB", "X_FE"])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_given_frame_stays_to_the_last_bit_and_the_other_is_recovered(ur5, has_orientation, which, seed):

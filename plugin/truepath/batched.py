@@ -33,9 +33,9 @@ class BatchedFunction:
         mapped = function.map(f"{function.name()}_map", "serial", N, list(common), [])
         self._buffer, self._trigger = mapped.buffer()
         for index, array in enumerate(self.inputs):
-            self._buffer.set_arg(index, memoryview(array))
+            self._buffer.set_arg(index, memoryview(array))  # type: ignore[call-arg, arg-type]
         for index, array in enumerate(self.outputs):
-            self._buffer.set_res(index, memoryview(array))
+            self._buffer.set_res(index, memoryview(array))  # type: ignore[call-arg, arg-type]
 
     def __call__(self) -> list[Array]:
         """Evaluates; returns ``outputs``."""

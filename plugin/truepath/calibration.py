@@ -10,210 +10,34 @@ import hashlib
 import json
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 from typing_extensions import Self
 
-from truepath import lie
+from truepath.calibration_parts import (
+    DataPart,
+    EffectPart,
+    FramePart,
+    HeldOutPart,
+    NoisePart,
+    Parameter,
+    Part,
+    RegionPart,
+    RobotPart,
+)
 from truepath.errors import InputError
 from truepath.files import write_atomically
-from truepath.lie import Array
 from truepath.model import CalibratedModel
 from truepath.poe import parameter_names
-from truepath.region import Region
 from truepath.robot import NominalRobot
 
-SCHEMA = "truepath.calibration/1"
+SCHEMA: Literal["truepath.calibration/1"] = "truepath.calibration/1"
 MAX_BYTES = 256 << 20
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class Pose(_Part):
-    """A rigid transform: translation in m, rotation matrix row by row."""
-
-    translation_m: Vector3
-    rotation: Annotated[list[Vector3], Field(min_length=3, max_length=3)]
-
-    @classmethod
-    def of(cls, X: Array) -> Pose:
-        return cls(translation_m=X[:3, 3].tolist(), rotation=X[:3, :3].tolist())
-
-    @model_validator(mode="after")
-    def _is_rotation(self) -> Self:
-        R = np.array(self.rotation)
-        # Sizes first: the product of huge numbers is no number, and that would pass every comparison.
-        if np.abs(R).max() > 2 or np.abs(R @ R.T - np.eye(3)).max() > 1e-9 or np.linalg.det(R) < 0:
-            raise ValueError("the matrix is no rotation")
-        return self
-
-    def matrix(self) -> Array:
-        return lie.make_pose(np.array(self.rotation), np.array(self.translation_m))
-
-
-class RobotPart(_Part):
-    """The nominal robot, as it was read from its Drake plant. Limits are null where the model has none."""
-
-    name: str
-    source: str
-    model_sha256: str
-    joint_names: Annotated[list[str], Field(min_length=2)]
-    axes: list[Pose]
-    zero_pose: Pose
-    lower_rad: list[Finite | None]
-    upper_rad: list[Finite | None]
-    velocity_rad_s: list[Finite | None]
-    acceleration_rad_s2: list[Finite | None]
-    link_mass_kg: list[Finite]
-    link_centre_m: list[Vector3]
-    gravity_m_s2: Vector3
-    world_base: Pose
-    reflector: Pose | None
-
-    @classmethod
-    def of(cls, robot: NominalRobot, source: str) -> RobotPart:
-        def limits(values: Array) -> list[float | None]:
-            return [float(v) if np.isfinite(v) else None for v in values]
-
-        return cls(
-            name=robot.name,
-            source=source,
-            model_sha256=robot.model_sha256,
-            joint_names=list(robot.joint_names),
-            axes=[Pose.of(X) for X in robot.X_BA],
-            zero_pose=Pose.of(robot.X_BF),
-            lower_rad=limits(robot.lower_rad),
-            upper_rad=limits(robot.upper_rad),
-            velocity_rad_s=limits(robot.velocity_rad_s),
-            acceleration_rad_s2=limits(robot.acceleration_rad_s2),
-            link_mass_kg=robot.link_mass_kg.tolist(),
-            link_centre_m=robot.p_BoLcm_B.tolist(),
-            gravity_m_s2=robot.gravity_B.tolist(),
-            world_base=Pose.of(robot.X_WB),
-            reflector=None if robot.X_FR is None else Pose.of(robot.X_FR),
-        )
-
-    @model_validator(mode="after")
-    def _is_consistent(self) -> Self:
-        per_joint = ("axes", "lower_rad", "upper_rad", "velocity_rad_s", "acceleration_rad_s2")
-        for name in (*per_joint, "link_mass_kg", "link_centre_m"):
-            if len(getattr(self, name)) != len(self.joint_names):
-                raise ValueError(f"{name} has {len(getattr(self, name))} entries for {len(self.joint_names)} joints")
-        if self.robot().model_sha256 != self.model_sha256:
-            raise ValueError("model_sha256 does not belong to this nominal model")
-        return self
-
-    def robot(self) -> NominalRobot:
-        def limits(values: list[float | None], missing: float) -> Array:
-            return np.array([missing if v is None else v for v in values])
-
-        return NominalRobot(
-            name=self.name,
-            joint_names=tuple(self.joint_names),
-            X_BA=np.stack([axis.matrix() for axis in self.axes]),
-            X_BF=self.zero_pose.matrix(),
-            lower_rad=limits(self.lower_rad, -np.inf),
-            upper_rad=limits(self.upper_rad, np.inf),
-            velocity_rad_s=limits(self.velocity_rad_s, np.inf),
-            acceleration_rad_s2=limits(self.acceleration_rad_s2, np.inf),
-            link_mass_kg=np.array(self.link_mass_kg),
-            p_BoLcm_B=np.array(self.link_centre_m),
-            gravity_B=np.array(self.gravity_m_s2),
-            X_WB=self.world_base.matrix(),
-            X_FR=None if self.reflector is None else self.reflector.matrix(),
-        )
-
-
-class Parameter(_Part):
-    """One estimated or held quantity. Frame parameters tell about a small step from the frame's estimate."""
-
-    name: str
-    joint: int | None
-    value: Finite
-    sigma: Annotated[Finite, Field(ge=0)]
-    unit: str
-    status: Literal["estimated", "held"]
-    reason: str | None
-
-
-class FramePart(_Part):
-    """A frame as estimated, and as it is for the nominal robot: stated by the user, or fitted to it."""
-
-    estimated: Pose
-    nominal: Pose
-    nominal_source: Literal["given", "registered"]
-
-
-class RegionPart(_Part):
-    """The region of joint space that the data covered: see ``region.Region``."""
-
-    lower_rad: list[Finite]
-    upper_rad: list[Finite]
-    mean_rad: list[Finite]
-    whitening: list[list[Finite]]
-    radius: Annotated[Finite, Field(gt=0)]
-
-    @classmethod
-    def of(cls, region: Region) -> RegionPart:
-        arrays = {name: getattr(region, name).tolist() for name in ("lower_rad", "upper_rad", "mean_rad", "whitening")}
-        return cls(**arrays, radius=region.radius)
-
-    def region(self) -> Region:
-        return Region(
-            np.array(self.lower_rad),
-            np.array(self.upper_rad),
-            np.array(self.mean_rad),
-            np.array(self.whitening),
-            self.radius,
-        )
-
-
-class StatisticsPart(_Part):
-    mean: Finite
-    rms: Finite
-    p95: Finite
-    max: Finite
-
-
-class AccuracyPart(_Part):
-    position_mm: StatisticsPart
-    distance_mm: StatisticsPart | None
-    orientation_mrad: StatisticsPart | None
-
-
-class HeldOutPart(_Part):
-    """Errors on data that the fit had not seen."""
-
-    method: str
-    nominal: AccuracyPart
-    calibrated: AccuracyPart
-
-
-class NoisePart(_Part):
-    """Noise per axis that the fit found, including what the model cannot explain."""
-
-    position_mm: Annotated[Finite, Field(ge=0)]
-    orientation_mrad: Annotated[Finite, Field(ge=0)] | None
-
-
-class DataPart(_Part):
-    """Where the calibration comes from. Outliers are line numbers of that file."""
-
-    file: str
-    sha256: str
-    poses: Annotated[int, Field(gt=0)]
-    has_orientation: bool
-    outlier_lines: list[int]
-
-
-class Calibration(_Part):
+class Calibration(Part):
     """The content of ``calibration.json``."""
 
     schema_: Literal["truepath.calibration/1"] = Field(alias="schema", default=SCHEMA)
@@ -223,6 +47,7 @@ class Calibration(_Part):
     base: FramePart
     tool: FramePart
     parameters: list[Parameter]
+    effects: list[EffectPart]
     region: RegionPart
     noise: NoisePart
     heldout: HeldOutPart | None
@@ -234,6 +59,8 @@ class Calibration(_Part):
         expected = [(str(name), name.joint, name.unit) for name in parameter_names(n)]
         if [(p.name, p.joint, p.unit) for p in self.parameters] != expected:
             raise ValueError(f"the parameters are not those of a robot with {n} joints")
+        if any(effect.joint > n for effect in self.effects):
+            raise ValueError(f"an effect on a joint beyond the robot's {n}")
         shapes = (len(self.region.lower_rad), len(self.region.upper_rad), len(self.region.mean_rad))
         if shapes != (n, n, n) or np.shape(self.region.whitening) != (n, n):
             raise ValueError(f"the region is not that of a robot with {n} joints")
@@ -251,6 +78,7 @@ class Calibration(_Part):
             X_FE_nominal=self.tool.nominal.matrix(),
             base_is_given=self.base.nominal_source == "given",
             tool_is_given=self.tool.nominal_source == "given",
+            effects=tuple(effect.fitted() for effect in self.effects),
         )
 
     def to_json(self) -> str:

@@ -44,12 +44,16 @@ def calibrate(
     probe: Annotated[
         str, typer.Option(help="place of the probe on the flange: unknown, model (frame 'reflector'), or x,y,z in mm")
     ] = "unknown",
+    effects: Annotated[
+        str, typer.Option(help="auto: those that the data speaks for; none: kinematics only; or names, comma-separated")
+    ] = "auto",
     parameters: Annotated[bool, typer.Option("--parameters", help="also list every parameter")] = False,
     json: Json = False,
 ) -> None:
     """Learn the real robot from measured poses and write a calibration file."""
     from truepath import console
     from truepath.learn import learn
+    from truepath.pipeline import named_effects
     from truepath.readers import read_measurements, with_nominal_frames
 
     with console.progress("calibrating") as say:
@@ -58,11 +62,11 @@ def calibrate(
         say("reading the data")
         measurements = read_measurements(data, nominal, format)
         measurements = with_nominal_frames(measurements, *_stated_frames(nominal, measured_in, probe))
-        calibration, _ = learn(nominal, measurements, source=robot, progress=say)
+        calibration, _ = learn(nominal, measurements, effects=named_effects(effects), source=robot, progress=say)
         calibration.save(output)
     if json:
         content = calibration.model_dump(by_alias=True, include={"robot": {"name", "model_sha256"}})
-        content |= calibration.model_dump(include={"heldout", "noise", "data", "parameters"})
+        content |= calibration.model_dump(include={"heldout", "noise", "data", "parameters", "effects"})
         console.print_json({"calibration": str(output), **content})
         return
     console.print_calibration(calibration)
@@ -177,13 +181,16 @@ def export(
     robot: Annotated[str | None, typer.Option("--robot", help="nominal URDF; default: the calibration's own")] = None,
 ) -> None:
     """Write a URDF with the calibrated kinematics, for Drake and other tools."""
-    from truepath import console, plants
+    from truepath import console
     from truepath.calibration import load_calibration
     from truepath.export import write_calibrated_urdf
+    from truepath.model_files import find_urdf
 
     loaded = load_calibration(calibration)
-    urdf = plants.urdf_of(robot or loaded.robot.source, loaded.robot.joint_names)
+    urdf = find_urdf(robot or loaded.robot.source, tuple(loaded.robot.joint_names), loaded.robot.name)
     write_calibrated_urdf(loaded.model, urdf, output)
+    if loaded.effects:
+        console.out.print("[yellow]a URDF is rigid: the named effects of the calibration are not in it[/yellow]")
     console.out.print(f"written to {output}")
 
 

@@ -12,11 +12,13 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from truepath.calibration import Calibration
+    from truepath.calibration_parts import AccuracyPart
     from truepath.correct import Correction
     from truepath.iso9283 import Accuracy
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+# Soft wrap: a path or a sentence is one line wherever it goes; terminals break lines by themselves.
+out = Console(highlight=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 @contextmanager
@@ -31,21 +33,28 @@ def print_json(content: Any) -> None:
     print(json.dumps(content, indent=1, allow_nan=False))
 
 
-def print_accuracy(title: str, before: Accuracy, after: Accuracy) -> None:
-    """A table of errors of the nominal and of the calibrated robot."""
-    table = Table(title=title, title_justify="left", caption="nominal → calibrated", caption_justify="left")
+def print_accuracy(
+    title: str,
+    before: Accuracy | AccuracyPart,
+    after: Accuracy | AccuracyPart,
+    between: Accuracy | AccuracyPart | None = None,
+) -> None:
+    """A table of errors of the nominal robot, of the one with calibrated kinematics, and of the calibrated one."""
+    steps = "nominal → calibrated" if between is None else "nominal → kinematics calibrated → with effects"
+    table = Table(title=title, title_justify="left", caption=steps, caption_justify="left")
     table.add_column("error")
     for name in ("mean", "rms", "p95", "max"):
         table.add_column(name, justify="right")
-    rows = (
-        ("position, mm", before.position_mm, after.position_mm),
-        ("distance, mm", before.distance_mm, after.distance_mm),
-        ("orientation, mrad", before.orientation_mrad, after.orientation_mrad),
-    )
-    for label, old, new in rows:
-        if old is not None and new is not None:
-            cells = (f"{getattr(old, s):.3f} → {getattr(new, s):.3f}" for s in ("mean", "rms", "p95", "max"))
-            table.add_row(label, *cells)
+    models = [model for model in (before, between, after) if model is not None]
+    for label, field in (
+        ("position, mm", "position_mm"),
+        ("distance, mm", "distance_mm"),
+        ("orientation, mrad", "orientation_mrad"),
+    ):
+        errors = [getattr(model, field) for model in models]
+        if None not in errors:
+            names = ("mean", "rms", "p95", "max")
+            table.add_row(label, *(" → ".join(f"{getattr(error, name):.3f}" for error in errors) for name in names))
     out.print(table)
 
 
@@ -56,13 +65,18 @@ def print_calibration(calibration: Calibration) -> None:
     out.print(f"[bold]{calibration.robot.name}[/bold] calibrated on {data.poses} poses ({kind}) of {data.file}")
     if calibration.heldout is not None:
         held_out = calibration.heldout
-        print_accuracy("on poses that the fit had not seen", held_out.nominal, held_out.calibrated)  # type: ignore[arg-type]
+        title = f"on {held_out.poses} poses that the fit had not seen"
+        print_accuracy(title, held_out.nominal, held_out.calibrated, held_out.kinematic)
     else:
         out.print("[yellow]too few poses to hold any back: the accuracy on new poses is not known[/yellow]")
     spread = f"{noise.position_mm:.4f} mm per axis"
     if noise.orientation_mrad is not None:
         spread += f", {noise.orientation_mrad:.4f} mrad per axis"
     out.print(f"left unexplained (noise and what the model lacks): {spread}")
+    for name in dict.fromkeys(effect.name for effect in calibration.effects):
+        found = [effect for effect in calibration.effects if effect.name == name]
+        joints = ", ".join(str(effect.joint) for effect in found)
+        out.print(f"[bold]{name}[/bold] on joint {joints}: {found[0].cause}; {found[0].remedy}")
     if data.outlier_lines:
         shown = ", ".join(map(str, data.outlier_lines[:12])) + (" ..." if len(data.outlier_lines) > 12 else "")
         out.print(f"[yellow]{len(data.outlier_lines)} outliers left out, lines {shown}[/yellow]")

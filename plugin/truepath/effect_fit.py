@@ -16,7 +16,7 @@ from truepath.robot import NominalRobot
 from truepath.robust_fit import NOISE_FLOOR, RobustFit, inliers
 
 MAX_ROUNDS = 8
-SETTLED_M = 1e-7
+SETTLED = 0.05  # of the noise: the largest change of any prediction that is not worth another round
 FRAME_PRIOR = 1.0  # m and rad: no prior at all, but finite
 
 
@@ -79,8 +79,8 @@ def fit_effects(
         sigma = np.repeat(np.maximum(posterior.sigma, NOISE_FLOOR), 3)
         residual = residual + A @ step
         before, inlier = inlier, inliers(residual, sigma)
-        moved = np.abs(A @ step).max()
-        if (moved < SETTLED_M or not terms) and np.array_equal(before, inlier):
+        moved = np.abs(A @ step / sigma).max()
+        if (moved < SETTLED or not terms) and np.array_equal(before, inlier):
             break
     k = layout.num_kinematic
     return EffectFit(
@@ -142,6 +142,6 @@ def _found(terms: Sequence[Term], layout: _Layout, posterior: Posterior) -> tupl
         keep = posterior.size[group] > IRRELEVANT * layout.plausible[group]
         if keep.any():
             kept = tuple(parameter for parameter, k in zip(term.parameters, keep, strict=True) if k)
-            small = Term(term.effect, term.joint, term.lower_rad, term.upper_rad, kept, term.settings)
+            small = Term(term.effect, term.joint, term.lower_rad, term.upper_rad, kept)
             found.append(FittedTerm(small, posterior.x[own[keep]], sigma[own[keep]]))
     return tuple(found)

@@ -116,7 +116,7 @@ def _normal_equations(residual: Array, jacobian: Array, weights: Array) -> tuple
 
 
 def covariance(solution: Solution, sigma: Array) -> Array:
-    """``(k, k)`` covariance of the solution for independent noise ``sigma`` ``(m,)`` on each component, and its prior."""
+    """``(k, k)`` covariance of the solution for noise ``sigma`` ``(m,)`` on each component, and its prior."""
     H, _ = _normal_equations(solution.residual / sigma, solution.jacobian / sigma[:, None], solution.weights)
     H = H + np.diag(np.broadcast_to(solution.precision, H.shape[:1]))
     scale = np.sqrt(np.diag(H))

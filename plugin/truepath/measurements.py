@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,8 +71,9 @@ class Measurements:
     def subset(self, rows: Array) -> Measurements:
         """The poses picked by an index or boolean array, in that order."""
         per_pose = ("q_rad", "p_ME", "R_ME", "time_s", "temperature_c", "payload_kg", "approach", "pose_id", "line")
-        parts = {name: getattr(self, name) for name in per_pose}
-        return replace(self, **{name: None if part is None else part[rows] for name, part in parts.items()})
+        parts: dict[str, Any] = {name: getattr(self, name) for name in per_pose}
+        picked: dict[str, Any] = {name: None if part is None else part[rows] for name, part in parts.items()}
+        return replace(self, **picked)
 
     def groups(self) -> Array:
         """``(N,)`` group number of each pose, counted from 0: repeated visits of one pose share it."""

@@ -62,8 +62,8 @@ class CalibratedModel:
         """``(N, 4, 4)`` poses X_ME of the probe that a tracker would see."""
         return self.X_MB @ self.flange_poses(q_rad, payload_kg) @ self.X_FE
 
-    def predict_nominal(self, q_rad: Array) -> Array:
-        """``(N, 4, 4)`` poses X_ME of the probe if the robot were as its maker drew it."""
+    def predict_nominal(self, q_rad: Array, payload_kg: Array | float = 0.0) -> Array:
+        """``(N, 4, 4)`` poses X_ME of the probe if the robot were as its maker drew it; no payload bends it."""
         return self.X_MB_nominal @ nominal_flange_poses(self.robot, q_rad) @ self.X_FE_nominal
 
     def goal_flange_poses(self, X_BF_programmed: Array) -> Array:

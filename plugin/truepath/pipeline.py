@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from truepath import lie
 from truepath.calibration import Calibration
 from truepath.correct import MAX_CORRECTION_MM, Correction, correct
+from truepath.effects import effect_named
 from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.inverse import joints_along_path
@@ -47,6 +49,16 @@ def correct_toolpath(
         q = joints_along_path(model.robot, toolpath.X_BF, region, line, file)
     correction = correct(model, q, region=region, line=line, file=file, max_correction_mm=max_correction_mm)
     return CorrectedToolpath(toolpath, q, correction, toolpath.with_joints(correction.q_rad))
+
+
+def named_effects(text: str) -> tuple[str, ...] | Literal["auto"]:
+    """Effects as stated on the command line: ``auto``, ``none``, or names with commas between them."""
+    if text == "auto":
+        return "auto"
+    names = () if text == "none" else tuple(name.strip() for name in text.split(","))
+    for name in names:
+        effect_named(name)
+    return names
 
 
 def stated_base(robot: NominalRobot, measured_in: str) -> Array | None:

@@ -101,7 +101,7 @@ class PoseProblem:
         return self.evaluate_with_angles(p, np.zeros_like(self._q_rad))[:2]
 
     def evaluate_with_angles(self, p: Array, joint_error_rad: Array) -> tuple[Array, Array, Array]:
-        """The same when joints stand off from their commands by ``(N, n)``, and the derivative ``(N, m, n)`` by that."""
+        """The same with joints that stand off by ``(N, n)`` from their commands, and the derivative ``(N, m, n)``."""
         n = self.robot.num_joints
         axes = poe.calibrated_axes(self.robot, p)
         X_BE = self.robot.X_BF @ self.X_FE @ poe.frame_step(p[poe.tool_slice(n)])

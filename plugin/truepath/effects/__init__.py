@@ -8,7 +8,7 @@ from pkgutil import iter_modules
 
 import numpy as np
 
-from truepath.effects.base import Effect, FittedTerm, Term, basis
+from truepath.effects.base import Effect, FittedTerm, Term, basis, basis_function
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.robot import NominalRobot
@@ -26,6 +26,15 @@ def effect_named(name: str) -> Effect:
     if name not in EFFECTS:
         raise InputError(f"unknown effect {name!r}", expected="one of " + ", ".join(sorted(EFFECTS)))
     return EFFECTS[name]
+
+
+def is_understood(term: Term) -> bool:
+    """Whether the effect can make sense of a term's parameters, which may come from a file."""
+    try:
+        basis_function(EFFECTS[term.effect], term)
+    except (ValueError, LookupError, ArithmeticError, RuntimeError, OverflowError):
+        return False
+    return True
 
 
 def terms_of(names: Iterable[str], robot: NominalRobot, q_rad: Array) -> list[Term]:

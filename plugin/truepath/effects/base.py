@@ -45,7 +45,6 @@ class Term:
         effect: name of the effect.
         joint: number of the joint.
         lower_rad, upper_rad: angles that the data covered; beyond them the term fades to nothing.
-        settings: what the effect needs to know besides its parameters.
         parameters: what is to be found.
     """
 
@@ -54,10 +53,6 @@ class Term:
     lower_rad: float
     upper_rad: float
     parameters: tuple[EffectParameter, ...]
-    settings: tuple[tuple[str, float], ...] = ()
-
-    def setting(self, name: str) -> float:
-        return dict(self.settings)[name]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +99,13 @@ def basis(effect: Effect, term: Term, q_rad: Array, context: Mapping[str, Array]
     joint = term.joint - 1
     theta = q_rad[:, joint]
     inputs = [theta, *(context[name][:, joint] for name in effect.needs)]
-    (jacobian,) = BatchedFunction(_derivative(effect, term), inputs)()
+    (jacobian,) = BatchedFunction(basis_function(effect, term), inputs)()
     return jacobian[:, :, 0] * fade(theta, term.lower_rad, term.upper_rad)[:, None]
 
 
 @lru_cache(maxsize=256)
-def _derivative(effect: Effect, term: Term) -> ca.Function:
+def basis_function(effect: Effect, term: Term) -> ca.Function:
+    """CasADi function (theta, context ...) of one pose: derivative ``(1, k)`` of the error by the parameters."""
     theta, parameters = ca.SX.sym("theta"), ca.SX.sym("parameters", len(term.parameters))
     context = {name: ca.SX.sym(name) for name in effect.needs}
     jacobian = ca.jacobian(effect.joint_error(term, theta, context, parameters), parameters)

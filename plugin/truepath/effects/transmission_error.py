@@ -51,7 +51,7 @@ class TransmissionError(Effect):
             if kind == "half-wave":
                 waves.append(ca.cos(np.pi * int(order) * (theta - term.lower_rad) / (term.upper_rad - term.lower_rad)))
             else:
-                waves.append((ca.cos if kind == "cos" else ca.sin)(int(order) * theta))
+                waves.append({"cos": ca.cos, "sin": ca.sin}[kind](int(order) * theta))
         return ca.dot(parameters, ca.vertcat(*waves))
 
 

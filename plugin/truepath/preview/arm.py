@@ -19,8 +19,8 @@ import yourdfpy
 from truepath import lie, poe
 from truepath.errors import InputError
 from truepath.lie import Array
-from truepath.preview.geometry import Y_TO_Z, rod
 from truepath.model_files import find_urdf, mesh_file
+from truepath.preview.geometry import Y_TO_Z, rod
 from truepath.robot import NominalRobot
 
 SAME_ROBOT_M = 1e-4

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from truepath.calibration import StatisticsPart
+from truepath.calibration_parts import StatisticsPart
 from truepath.iso9283 import ErrorStatistics
 from truepath.preview import scene
 from truepath.preview.toolpaths import KeyFrames
