@@ -19,18 +19,19 @@ from truepath.poe import flange_poses, parameter_names
 
 
 def learnt(robot, has_orientation):
-    """A calibration of a robot that deviates, from sixty poses with noise and two gross errors."""
+    """A calibration of a robot that deviates, is soft and has uneven gears, from noisy poses with two gross errors."""
     rng = np.random.default_rng(11)
-    q = rng.uniform(-2, 2, (60, robot.num_joints))
+    q = rng.uniform(-2, 2, (90, robot.num_joints))
+    phi = q + 3e-5 * robot.gravity_torque(q) + 5e-4 * np.cos(2 * q)
     X_MB, X_FE = np.eye(4), np.eye(4)
     X_MB[:3, :3], X_MB[:3, 3] = Rotation.from_rotvec([0.1, 2, -0.5]).as_matrix(), [2.0, -1.0, 0.3]
     X_FE[:3, :3], X_FE[:3, 3] = Rotation.from_rotvec([0.3, 0, 1]).as_matrix(), [0.05, -0.02, 0.1]
-    X = X_MB @ flange_poses(robot, 1e-3 * rng.normal(size=4 * robot.num_joints + 12), q) @ X_FE
-    p_ME = X[:, :3, 3] + 2e-5 * rng.normal(size=(60, 3))
+    X = X_MB @ flange_poses(robot, 1e-3 * rng.normal(size=4 * robot.num_joints + 12), phi) @ X_FE
+    p_ME = X[:, :3, 3] + 2e-5 * rng.normal(size=(90, 3))
     p_ME[[7, 30]] += 0.2
-    turn = Rotation.from_rotvec(1e-4 * rng.normal(size=(60, 3))).as_matrix()
+    turn = Rotation.from_rotvec(1e-4 * rng.normal(size=(90, 3))).as_matrix()
     data = Measurements(q_rad=q, p_ME=p_ME, R_ME=turn @ X[:, :3, :3] if has_orientation else None)
-    return learn(robot, data, source="a test")
+    return learn(robot, data, effects=("transmission_error", "joint_compliance"), source="a test")
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +114,7 @@ def test_a_loaded_calibration_predicts_to_the_last_bit_what_the_fit_did(request,
     calibration.save(tmp_path / "c.json")
     model = load_calibration(tmp_path / "c.json", robot).model
     q = np.random.default_rng(1).uniform(-2, 2, (20, robot.num_joints))
+    assert model.effects
     for method in ("predict", "predict_nominal", "flange_poses"):
         np.testing.assert_array_equal(getattr(model, method)(q), getattr(fit.model, method)(q), err_msg=method)
     np.testing.assert_array_equal(model.robot.gravity_torque(q), robot.gravity_torque(q))
@@ -140,8 +142,9 @@ def test_the_file_says_where_it_comes_from(text):
     assert content["schema"] == "truepath.calibration/1"
     assert {"python", "truepath", "drake", "numpy"} <= set(content["software"])
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", content["created_utc"])
-    assert content["data"]["poses"] == 60
+    assert content["data"]["poses"] == 90
     assert content["data"]["outlier_lines"] == [9, 32]
+    assert {effect["name"] for effect in content["effects"]} == {"transmission_error", "joint_compliance"}
     assert re.fullmatch("[0-9a-f]{64}", content["data"]["sha256"])
 
 
@@ -250,7 +253,7 @@ def test_nesting_of_any_depth_in_any_place_is_refused(text, refusal, depth, wher
 
 
 def test_a_number_of_thousands_of_digits_is_refused(text, refusal):
-    refusal(text.replace('"poses": 60', '"poses": ' + "6" * 5000))
+    refusal(text.replace('"poses": 90', '"poses": ' + "6" * 5000))
 
 
 # Spoilt files
@@ -338,7 +341,7 @@ NOT_A_ROTATION = {
     "sheared": [[1, 1e-6, 0], [0, 1, 0], [0, 0, 1]],
     "mirrored": [[1, 0, 0], [0, 1, 0], [0, 0, -1]],
     "zero": [[0, 0, 0], [0, 0, 0], [0, 0, 0]],
-    "huge": [[1e200, 1e200, 0], [1e200, -1e200, 0], [0, 0, 1]],
+    "huge": [[1e200, 1e200, 0], [-1e200, 1e200, 0], [0, 0, 1]],
 }
 
 

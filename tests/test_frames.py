@@ -79,10 +79,17 @@ def test_a_base_turned_by_exactly_half_a_turn_or_not_at_all_is_no_trap(seven, ha
     np.testing.assert_allclose(X_FE, setup.X_FE, atol=1e-6)
 
 
-def test_poses_in_one_plane_are_placed_and_never_mirrored(ur5, has_orientation):
-    setup = Setup(ur5, 5, has_orientation, poses=30)
-    setup.q[:, [0, 4, 5]] = 0.3  # only the parallel axes move
-    setup.X_BF = nominal_flange_poses(ur5, setup.q)
+@pytest.mark.parametrize("poor", ["all in one plane", "all of one orientation", "all turned about one axis"])
+@pytest.mark.parametrize("seed", range(4))
+def test_poses_that_do_not_tell_both_frames_apart_are_placed_all_the_same(ur5, has_orientation, poor, seed):
+    setup = Setup(ur5, seed, has_orientation, poses=30)
+    if poor == "all in one plane":
+        setup.q[:, [0, 4, 5]] = 0.3  # only the parallel axes move
+        setup.X_BF = nominal_flange_poses(ur5, setup.q)
+    else:
+        turn = setup.rng.uniform(-1, 1, 30) * (poor == "all turned about one axis")
+        about_z = Rotation.from_rotvec(turn[:, None] * [0, 0, 1])
+        setup.X_BF[:, :3, :3] = (about_z * Rotation.from_matrix(setup.X_BF[0, :3, :3])).as_matrix()
     setup.X_ME = setup.X_MB @ setup.X_BF @ setup.X_FE
     setup.p_ME, setup.R_ME = setup.X_ME[:, :3, 3], setup.X_ME[:, :3, :3] if has_orientation else None
     X_MB, X_FE = setup.register()

@@ -12,14 +12,17 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DATA = "../shared/data"
 STEP_TIMEOUT_S = 240
+NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]\d+)?")
 
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 
-def commands(on_real_data: bool) -> list[str]:
-    return [block for block in blocks("bash") if (DATA in block) == on_real_data]
+def steps(on_real_data: bool) -> list[tuple[str, str]]:
+    """Commands to paste and what the README says that they print, if anything."""
+    found = re.findall(r"^```bash\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", README, flags=re.MULTILINE | re.DOTALL)
+    return [(pasted, promised) for pasted, promised in found if (DATA in pasted) == on_real_data]
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +35,8 @@ def checkout(tmp_path_factory) -> Path:
     return folder
 
 
-def paste(text: str, folder: Path) -> None:
-    env = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+def paste(text: str, folder: Path) -> str:
+    env = {**os.environ, "COLUMNS": "140"}  # tables as wide as they like
     done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", text],
         cwd=folder,
@@ -44,22 +47,40 @@ def paste(text: str, folder: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, f"{text}\nexit code {done.returncode}\n{done.stdout}\n{done.stderr}"
-    for written in re.findall(r"(?:-o|>) (\S+)", text):
+    for written in re.findall(r"(?:-o|>) (out/\S+)", text):
         assert (folder / written).stat().st_size > 0, f"{written} is empty"
+    return done.stdout
+
+
+def require_promised(promised: str, printed: str) -> None:
+    """Every line with a number in the README was printed, with nearly these numbers."""
+
+    def words(line: str) -> str:
+        return " ".join(NUMBER.sub("#", line).split())
+
+    for line in promised.splitlines():
+        if not NUMBER.search(line):
+            continue
+        alike = [other for other in printed.splitlines() if words(other) == words(line)]
+        assert alike, f"the README promises\n{line}\nbut this was printed\n{printed}"
+        expected = [float(number) for number in NUMBER.findall(line)]
+        close = [pytest.approx(expected, rel=0.1, abs=0.003) == list(map(float, NUMBER.findall(k))) for k in alike]
+        assert any(close), f"the README promises\n{line}\nbut this was printed\n" + "\n".join(alike)
 
 
 def test_every_block_is_one_that_these_tests_know():
     for block in blocks("bash"):
         for line in block.splitlines():
             assert line.startswith((".venv/bin/truepath ", "awk ", "mkdir -p out")), line
-    assert len(commands(on_real_data=False)) >= 5
-    assert len(commands(on_real_data=True)) >= 2
+    assert len(steps(on_real_data=False)) >= 5
+    assert len(steps(on_real_data=True)) >= 2
+    assert sum(bool(promised) for real in (False, True) for _, promised in steps(real)) == len(blocks("text"))
     assert README.count("```") == 2 * len(re.findall(r"^```\w+$", README, flags=re.MULTILINE))
 
 
 def test_the_tour_on_the_virtual_cell_and_the_python_example(checkout):
-    for block in commands(on_real_data=False):
-        paste(block, checkout)
+    for pasted, promised in steps(on_real_data=False):
+        require_promised(promised, paste(pasted, checkout))
     (example,) = blocks("python")
     assert len([line for line in example.splitlines() if line]) <= 12
     (checkout / "example.py").write_text(example, encoding="utf-8")
@@ -70,8 +91,8 @@ def test_the_tour_on_real_robots(checkout, data_dir):
     shared = checkout.parent / "shared"
     shared.mkdir()
     (shared / "data").symlink_to(data_dir.resolve())
-    for block in commands(on_real_data=True):
-        paste(block, checkout)
+    for pasted, promised in steps(on_real_data=True):
+        require_promised(promised, paste(pasted, checkout))
 
 
 def test_every_target_and_path_that_it_names_exists():

@@ -36,12 +36,12 @@ class DemoResult:
 
 def run_demo(folder: Path, seed: int, say: Callable[[str], None]) -> DemoResult:
     """Simulates, calibrates, validates, corrects and previews; every file goes to ``folder``."""
+    say("a robot with hidden errors is measured in 300 poses")
+    real, campaign = RealRobot(CELL, seed), Campaign(poses=300, noise_mm=0.02, seed=seed)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError("cannot make the folder", file=folder, found=error.strerror) from None
-    say("a robot with hidden errors is measured in 300 poses")
-    real, campaign = RealRobot(CELL, seed), Campaign(poses=300, noise_mm=0.02, seed=seed)
     q = free_poses(real, 500, np.random.default_rng(seed))
     write_atomically(folder / "measured.csv", to_csv(measure(real, q[:300], campaign)))
     write_atomically(folder / "truth.json", truth_json(real, campaign))

@@ -9,7 +9,7 @@ import numpy as np
 
 from truepath.effects import term_bases, terms_of
 from truepath.effects.base import FittedTerm, Term
-from truepath.evidence import IRRELEVANT, LinearProblem, Posterior, infer
+from truepath.evidence import LinearProblem, Posterior, infer
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.robot import NominalRobot
@@ -18,6 +18,8 @@ from truepath.robust_fit import NOISE_FLOOR, RobustFit, inliers
 MAX_ROUNDS = 8
 SETTLED = 0.05  # of the noise: the largest change of any prediction that is not worth another round
 FRAME_PRIOR = 1.0  # m and rad: no prior at all, but finite
+LEAST_LOG_ODDS_GROUP = 5.0  # for a band of waves or the like to stay
+LEAST_LOG_ODDS_TERM = 10.0  # for a joint to be named
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class EffectFit:
     Attributes:
         p: ``(4 n + 12,)`` kinematic parameters.
         covariance: of the free ones.
-        effects: what was found; terms and waves that the data has no use for are left out.
+        effects: what was found; joints and waves that the data does not speak for are left out.
         sigma: ``(m,)`` noise of each component.
         inlier: ``(N,)``.
         residual: ``(N, m)``.
@@ -49,44 +51,44 @@ def fit_effects(
     """Continues a kinematic fit with named effects; with none, only adds the evidence."""
     payload = 0.0 if measurements.payload_kg is None else measurements.payload_kg
     inlier, sigma = kinematic.solution.weights > 0, kinematic.sigma
-    terms = terms_of(names, robot, measurements.q_rad[inlier])
-    bases = term_bases(robot, measurements.q_rad, terms, payload)
-    layout = _Layout.of(terms, kinematic)
-    p, values = kinematic.p.copy(), np.zeros(layout.num_effects)
-    residual, size = kinematic.solution.residual, layout.plausible
+    offered = terms_of(names, robot, measurements.q_rad[inlier])
+    waves = _Waves.of(offered, term_bases(robot, measurements.q_rad, offered, payload))
+    kinematic_prior = np.minimum(kinematic.prior_sigma[kinematic.free], FRAME_PRIOR)
+    k = len(kinematic_prior)
+    p, values, size = kinematic.p.copy(), np.zeros(len(waves)), waves.plausible
     for _ in range(MAX_ROUNDS):
-        joint_error = _joint_error(measurements.q_rad.shape, terms, bases, values)
-        residual, by_p, by_angle = kinematic.problem.evaluate_with_angles(p, joint_error)
-        by_effect = [
-            by_angle[:, :, term.joint - 1, None] * base[:, None, :] for term, base in zip(terms, bases, strict=True)
-        ]
-        A = np.concatenate([by_p[:, :, kinematic.free], *by_effect], axis=2)
-        # Effects are solved for as they are, kinematics as a step from where it stands.
-        y = -residual + A[:, :, layout.num_kinematic :] @ values
-        posterior = infer(
-            LinearProblem.of(A[inlier], y[inlier]),
-            layout.group,
-            layout.plausible,
-            layout.fixed_sigma,
-            list(sigma[::3]),
-            size,
+        residual, by_p, by_angle = kinematic.problem.evaluate_with_angles(
+            p, waves.joint_error(values, robot.num_joints)
         )
-        size = posterior.size
-        step = posterior.x.copy()
-        step[layout.num_kinematic :] -= values
-        p[kinematic.free] += posterior.x[: layout.num_kinematic]
-        values = posterior.x[layout.num_kinematic :]
+        A = np.concatenate([by_p[:, :, kinematic.free], waves.columns(by_angle)], axis=2)
+        # Effects are solved for as they are, kinematics as a step from where it stands.
+        y = -residual + A[:, :, k:] @ values
+        problem, kept = LinearProblem.of(A[inlier], y[inlier]), np.arange(len(waves))
+        while True:
+            group = np.concatenate([np.full(k, -1), waves.group])
+            fixed = np.concatenate([kinematic_prior, np.ones(len(waves))])
+            posterior = infer(problem, group, waves.plausible, fixed, list(sigma[::3]), size)
+            size = posterior.size
+            speaks = waves.spoken_for(posterior, k)
+            if speaks.all():
+                break
+            waves, size = waves.only(speaks), size[np.unique(waves.group[speaks])]
+            kept = kept[speaks]
+            problem = problem.only(np.concatenate([np.ones(k, bool), speaks]))
+        step = np.concatenate([posterior.x[:k], -values])
+        step[k + kept] += posterior.x[k:]
+        p[kinematic.free] += posterior.x[:k]
+        values = posterior.x[k:]
         sigma = np.repeat(np.maximum(posterior.sigma, NOISE_FLOOR), 3)
-        residual = residual + A @ step
+        moved = A @ step
+        residual = residual + moved
         before, inlier = inlier, inliers(residual, sigma)
-        moved = np.abs(A @ step / sigma).max()
-        if (moved < SETTLED or not terms) and np.array_equal(before, inlier):
+        if (len(step) == k or np.abs(moved / sigma).max() < SETTLED) and np.array_equal(before, inlier):
             break
-    k = layout.num_kinematic
     return EffectFit(
         p=p,
         covariance=posterior.covariance[:k, :k],
-        effects=_found(terms, layout, posterior),
+        effects=waves.fitted(values, np.sqrt(np.diag(posterior.covariance)[k:])),
         sigma=sigma,
         inlier=inlier,
         residual=residual,
@@ -95,53 +97,92 @@ def fit_effects(
 
 
 @dataclass(frozen=True)
-class _Layout:
-    """Which column is what: kinematic parameters first, then the parameters of all terms one after the other."""
+class _Waves:
+    """All parameters of all terms in a row, whether waves or anything else.
 
-    num_kinematic: int
-    num_effects: int
+    Attributes:
+        terms: the terms, each with those of its parameters that are still there.
+        term: ``(k,)`` number of the term of each parameter.
+        group: ``(k,)`` number of the group of each.
+        plausible: ``(groups,)`` plausible size of each group.
+        basis: ``(N, k)`` error in rad of the term's joint per unit.
+    """
+
+    terms: tuple[Term, ...]
+    term: Array
     group: Array
     plausible: Array
-    fixed_sigma: Array
+    basis: Array
 
     @classmethod
-    def of(cls, terms: Sequence[Term], kinematic: RobustFit) -> _Layout:
-        kinematic_prior = np.minimum(kinematic.prior_sigma[kinematic.free], FRAME_PRIOR)
-        numbers: dict[tuple[str, int, str], int] = {}
-        group, plausible = [], {}
-        for term in terms:
-            for parameter in term.parameters:
-                number = numbers.setdefault((term.effect, term.joint, parameter.group), len(numbers))
-                plausible[number] = parameter.prior_scale
-                group.append(number)
-        k = len(kinematic_prior)
+    def of(cls, terms: Sequence[Term], bases: Sequence[Array]) -> _Waves:
+        labels = [(t, parameter.group) for t, term in enumerate(terms) for parameter in term.parameters]
+        numbers = {label: number for number, label in enumerate(dict.fromkeys(labels))}
+        plausible = {
+            numbers[t, parameter.group]: parameter.prior_scale
+            for t, term in enumerate(terms)
+            for parameter in term.parameters
+        }
         return cls(
-            num_kinematic=k,
-            num_effects=len(group),
-            group=np.concatenate([np.full(k, -1), np.array(group, int)]),
-            plausible=np.array([plausible[number] for number in range(len(numbers))], float),
-            fixed_sigma=np.concatenate([kinematic_prior, np.ones(len(group))]),
+            tuple(terms),
+            np.array([t for t, _ in labels], int),
+            np.array([numbers[label] for label in labels], int),
+            np.array([plausible[number] for number in range(len(numbers))], float),
+            np.concatenate(bases, axis=1) if bases else np.zeros((0, 0)),
         )
 
+    def __len__(self) -> int:
+        return len(self.group)
 
-def _joint_error(shape: tuple[int, ...], terms: Sequence[Term], bases: list[Array], values: Array) -> Array:
-    error, first = np.zeros(shape), 0
-    for term, base in zip(terms, bases, strict=True):
-        error[:, term.joint - 1] += base @ values[first : first + base.shape[1]]
-        first += base.shape[1]
-    return error
+    def joint_error(self, values: Array, num_joints: int) -> Array:
+        """``(N, n)`` rad; a plain zero without any term."""
+        error = np.zeros((len(self.basis), num_joints)) if len(self) else np.zeros((1, num_joints))
+        for t, term in enumerate(self.terms):
+            own = self.term == t
+            error[:, term.joint - 1] += self.basis[:, own] @ values[own]
+        return error
 
+    def columns(self, by_angle: Array) -> Array:
+        """``(N, m, k)`` derivative of the residual, from that by the joint angles ``(N, m, n)``."""
+        if not len(self):
+            return np.zeros((*by_angle.shape[:2], 0))
+        joint = np.array([term.joint - 1 for term in self.terms])[self.term]
+        return by_angle[:, :, joint] * self.basis[:, None, :]
 
-def _found(terms: Sequence[Term], layout: _Layout, posterior: Posterior) -> tuple[FittedTerm, ...]:
-    """The terms with the groups of parameters that have not shrunk to nothing."""
-    sigma, found, first = np.sqrt(np.diag(posterior.covariance)), [], layout.num_kinematic
-    for term in terms:
-        own = np.arange(first, first + len(term.parameters))
-        first += len(own)
-        group = layout.group[own]
-        keep = posterior.size[group] > IRRELEVANT * layout.plausible[group]
-        if keep.any():
-            kept = tuple(parameter for parameter, k in zip(term.parameters, keep, strict=True) if k)
-            small = Term(term.effect, term.joint, term.lower_rad, term.upper_rad, kept)
-            found.append(FittedTerm(small, posterior.x[own[keep]], sigma[own[keep]]))
-    return tuple(found)
+    def spoken_for(self, posterior: Posterior, first: int) -> Array:
+        """``(k,)`` False for the parameters that are the next to go, because the data does not speak for them.
+
+        Groups of one term can stand in for each other, so only the weakest of each term goes at a time; when
+        no group has to go any more, the weakest term.
+        """
+        keep = np.ones(len(self), bool)
+        for t in range(len(self.terms)):
+            groups = np.unique(self.group[self.term == t])
+            odds = [self._log_odds(self.group == group, posterior, first) for group in groups]
+            if min(odds) < LEAST_LOG_ODDS_GROUP:
+                keep[self.group == groups[int(np.argmin(odds))]] = False
+        if keep.all() and self.terms:
+            odds = [self._log_odds(self.term == t, posterior, first) for t in range(len(self.terms))]
+            if min(odds) < LEAST_LOG_ODDS_TERM:
+                keep[self.term == int(np.argmin(odds))] = False
+        return keep
+
+    def _log_odds(self, own: Array, posterior: Posterior, first: int) -> float:
+        groups = self.group[own]
+        return posterior.log_odds(first + np.flatnonzero(own), posterior.size[groups], len(np.unique(groups)))
+
+    def only(self, keep: Array) -> _Waves:
+        """Without the parameters for which ``keep`` ``(k,)`` is False."""
+        terms = []
+        for t, term in enumerate(self.terms):
+            parameters = tuple(p for p, k in zip(term.parameters, keep[self.term == t], strict=True) if k)
+            if parameters:
+                terms.append(Term(term.effect, term.joint, term.lower_rad, term.upper_rad, parameters))
+        groups, group = np.unique(self.group[keep], return_inverse=True)
+        term_of = np.unique(self.term[keep], return_inverse=True)[1]
+        return _Waves(tuple(terms), term_of, group, self.plausible[groups], self.basis[:, keep])
+
+    def fitted(self, values: Array, sigma: Array) -> tuple[FittedTerm, ...]:
+        return tuple(
+            FittedTerm(term, values[self.term == t], sigma[self.term == t]) for t, term in enumerate(self.terms)
+        )

@@ -49,6 +49,11 @@ class LinearProblem:
             count.append(len(readings))
         return cls(H, g, yy, count)
 
+    def only(self, keep: Array) -> LinearProblem:
+        """The same readings with the parameters for which ``keep`` ``(k,)`` is True."""
+        pick = np.ix_(keep, keep)
+        return LinearProblem([H[pick] for H in self.H], [g[keep] for g in self.g], self.yy, self.count)
+
 
 @dataclass(frozen=True)
 class Posterior:
@@ -61,6 +66,7 @@ class Posterior:
         size: ``(groups,)`` learnt prior width of each group.
         log_evidence: logarithm of the marginal likelihood, less half the logarithm of the number of
             readings for each learnt size (Schwarz 1978), so that sizes have to earn their keep.
+        readings: number of readings.
     """
 
     x: Array
@@ -68,6 +74,19 @@ class Posterior:
     sigma: list[float]
     size: Array
     log_evidence: float
+    readings: int
+
+    def log_odds(self, own: Array, size: Array, num_sizes: int) -> float:
+        """Log Bayes factor for some parameters against their absence (Savage, Dickey), sizes paid for.
+
+        Args:
+            own: ``(j,)`` numbers of the parameters.
+            size: ``(j,)`` their prior widths.
+            num_sizes: how many of these widths were learnt.
+        """
+        x, covariance = self.x[own] / size, self.covariance[np.ix_(own, own)] / np.outer(size, size)
+        misfit = float(x @ np.linalg.solve(covariance, x))
+        return 0.5 * (misfit + float(np.linalg.slogdet(covariance)[1]) - num_sizes * np.log(self.readings))
 
 
 def infer(
@@ -111,7 +130,8 @@ def infer(
     precision[grouped] = size[group[grouped]] ** -2.0
     x, covariance, log_det = _solve(problem, precision, sigma)
     alive = int(np.sum(size > IRRELEVANT * plausible))
-    return Posterior(x, covariance, sigma, size, _log_evidence(problem, x, precision, log_det, sigma, alive))
+    log_evidence = _log_evidence(problem, x, precision, log_det, sigma, alive)
+    return Posterior(x, covariance, sigma, size, log_evidence, sum(problem.count))
 
 
 def _solve(problem: LinearProblem, precision: Array, sigma: list[float]) -> tuple[Array, Array, float]:

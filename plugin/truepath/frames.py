@@ -20,7 +20,7 @@ REFINEMENTS = 40
 SETTLED = 1e-7  # m and rad: far below what the fit that follows will change
 STUDENT_DOF = 3.0
 SUBSETS, SUBSET_SIZE = 64, 12
-MAX_MEDIAN_MISFIT_M = 0.1
+SUSPICIOUS_MISFIT_M, MAX_MEDIAN_MISFIT_M = 0.005, 0.1
 
 
 def register(
@@ -47,10 +47,11 @@ def register(
             with wrong units, another robot or another order of joints.
     """
     if X_MB is None or X_FE is None:
-        X_MB, X_FE = (
-            _register_points(X_BF, p_ME, X_MB, X_FE) if R_ME is None else _register_poses(X_BF, p_ME, R_ME, X_MB, X_FE)
-        )
-    misfit = float(np.median(np.linalg.norm((X_MB @ X_BF @ X_FE)[:, :3, 3] - p_ME, axis=1)))
+        if R_ME is None:
+            X_MB, X_FE = _register_points(X_BF, p_ME, X_MB, X_FE)
+        else:
+            X_MB, X_FE = _register_poses_or_points(X_BF, p_ME, R_ME, X_MB, X_FE)
+    misfit = _median_misfit(X_BF, p_ME, X_MB, X_FE)
     if misfit > MAX_MEDIAN_MISFIT_M:
         raise CalibrationError(
             f"the nominal robot misses half of the measurements by more than {1e3 * misfit:.0f} mm, wherever it is "
@@ -58,6 +59,10 @@ def register(
             "another robot, joints in another order, or wrong nominal frames"
         )
     return X_MB, X_FE
+
+
+def _median_misfit(X_BF: Array, p_ME: Array, X_MB: Array, X_FE: Array) -> float:
+    return float(np.median(np.linalg.norm((X_MB @ X_BF @ X_FE)[:, :3, 3] - p_ME, axis=1)))
 
 
 def _student_weights(distance_m: Array) -> Array:
@@ -137,6 +142,18 @@ def _refine_points(
             break
     residual = (X_MB[:3, :3] @ (X_BF[:, :3, :3] @ p_FE + X_BF[:, :3, 3]).T).T + X_MB[:3, 3] - p_ME
     return float(np.median(np.linalg.norm(residual, axis=1))), X_MB, p_FE
+
+
+def _register_poses_or_points(
+    X_BF: Array, p_ME: Array, R_ME: Array, X_MB: Array | None, X_FE: Array | None
+) -> tuple[Array, Array]:
+    """As _register_poses; where all poses turn about one axis, or not at all, the points tell how the base stands."""
+    found = _register_poses(X_BF, p_ME, R_ME, X_MB, X_FE)
+    if X_MB is not None or X_FE is not None or _median_misfit(X_BF, p_ME, *found) < SUSPICIOUS_MISFIT_M:
+        return found
+    X_MB_of_points, _ = _register_points(X_BF, p_ME, None, None)
+    other = _register_poses(X_BF, p_ME, R_ME, X_MB_of_points, None)
+    return min(found, other, key=lambda frames: _median_misfit(X_BF, p_ME, *frames))
 
 
 def _register_poses(

@@ -76,7 +76,8 @@ def _require_poses(measurements: Measurements) -> None:
     found = len(np.unique(np.round(measurements.q_rad, 6), axis=0))
     if found < needed:
         raise CalibrationError(
-            f"too few poses to find the frames again\n  expected: at least {needed} different poses\n  found:    {found}"
+            "too few poses to find the frames again\n"
+            f"  expected: at least {needed} different poses\n  found:    {found}"
         )
 
 

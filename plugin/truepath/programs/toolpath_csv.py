@@ -37,7 +37,7 @@ class Toolpath:
     radians_per_unit: float
 
     def with_joints(self, q_rad: Array) -> str:
-        """The text of the file with these joints ``(N, n)``; all else is kept: other cells, line ends, byte-order mark."""
+        """The text of the file with these joints ``(N, n)``; other cells, line ends and byte-order mark stay."""
         header = list(self.table.header)
         added = [name for name in self.joint_columns if name not in header]
         place = {name: index for index, name in enumerate([*header, *added])}
