@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -39,22 +40,23 @@ def print_accuracy(
     after: Accuracy | AccuracyPart,
     between: Accuracy | AccuracyPart | None = None,
 ) -> None:
-    """A table of errors of the nominal robot, of the one with calibrated kinematics, and of the calibrated one."""
-    steps = "nominal → calibrated" if between is None else "nominal → kinematics calibrated → with effects"
-    table = Table(title=title, title_justify="left", caption=steps, caption_justify="left")
+    """A table of errors of the nominal robot, of one with calibrated kinematics only, and of the calibrated one."""
+    models = {"nominal": before, "kinematics": between, "calibrated": after}
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     table.add_column("error")
+    table.add_column("model")
     for name in ("mean", "rms", "p95", "max"):
         table.add_column(name, justify="right")
-    models = [model for model in (before, between, after) if model is not None]
     for label, field in (
         ("position, mm", "position_mm"),
         ("distance, mm", "distance_mm"),
         ("orientation, mrad", "orientation_mrad"),
     ):
-        errors = [getattr(model, field) for model in models]
-        if None not in errors:
-            names = ("mean", "rms", "p95", "max")
-            table.add_row(label, *(" → ".join(f"{getattr(error, name):.3f}" for error in errors) for name in names))
+        for model, accuracy in models.items():
+            errors = None if accuracy is None else getattr(accuracy, field)
+            if errors is not None:
+                numbers = (f"{getattr(errors, name):.3f}" for name in ("mean", "rms", "p95", "max"))
+                table.add_row(label if model == "nominal" else "", model, *numbers, end_section=model == "calibrated")
     out.print(table)
 
 

@@ -49,10 +49,9 @@ def fit_effects(
     kinematic: RobustFit, robot: NominalRobot, measurements: Measurements, names: Sequence[str]
 ) -> EffectFit:
     """Continues a kinematic fit with named effects; with none, only adds the evidence."""
-    payload = 0.0 if measurements.payload_kg is None else measurements.payload_kg
     inlier, sigma = kinematic.solution.weights > 0, kinematic.sigma
     offered = terms_of(names, robot, measurements.q_rad[inlier])
-    waves = _Waves.of(offered, term_bases(robot, measurements.q_rad, offered, payload))
+    waves = _Waves.of(offered, term_bases(robot, measurements.q_rad, offered, measurements.extra_payload_kg))
     kinematic_prior = np.minimum(kinematic.prior_sigma[kinematic.free], FRAME_PRIOR)
     k = len(kinematic_prior)
     p, values, size = kinematic.p.copy(), np.zeros(len(waves)), waves.plausible

@@ -83,7 +83,7 @@ def _choose_and_verify(
     if after.position_mm.mean >= before.position_mm.mean:
         return (), None
     return names, _held_out(
-        f"every {FOLDS}th pose, drawn at random, kept away from fit and choice of effects",
+        "a fifth of the poses, drawn at random, kept away from fit and choice of effects",
         len(unseen),
         _accuracy(fit.model.predict_nominal, unseen),
         before,
@@ -107,7 +107,7 @@ def cross_validate(
     for number, rows in enumerate(measurements.folds(FOLDS)):
         progress(f"cross-validation {number + 1} of {FOLDS}")
         seen = measurements.subset(np.setdiff1d(np.arange(len(measurements)), rows))
-        q, payload = measurements.q_rad[rows], _payload(measurements.subset(rows))
+        q, payload = measurements.q_rad[rows], measurements.subset(rows).extra_payload_kg
         try:
             model = calibrate(robot, seen, effects).model
             if effects:
@@ -129,17 +129,13 @@ def cross_validate(
 def _not_gross(model: CalibratedModel, measurements: Measurements) -> Array:
     """``(N,)`` False for poses further from the model than ten times its median miss."""
     miss = np.linalg.norm(
-        model.predict(measurements.q_rad, _payload(measurements))[:, :3, 3] - measurements.p_ME, axis=1
+        model.predict(measurements.q_rad, measurements.extra_payload_kg)[:, :3, 3] - measurements.p_ME, axis=1
     )
     return miss <= 10.0 * np.median(miss)
 
 
-def _payload(measurements: Measurements) -> Array | float:
-    return 0.0 if measurements.payload_kg is None else measurements.payload_kg
-
-
 def _accuracy(predict: Callable[..., Array], measurements: Measurements) -> Accuracy:
-    X_ME = predict(measurements.q_rad, _payload(measurements))
+    X_ME = predict(measurements.q_rad, measurements.extra_payload_kg)
     return accuracy(X_ME, measurements.p_ME, measurements.R_ME, measurements.groups())
 
 

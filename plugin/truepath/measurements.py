@@ -68,6 +68,11 @@ class Measurements:
     def has_orientation(self) -> bool:
         return self.R_ME is not None
 
+    @property
+    def extra_payload_kg(self) -> Array | float:
+        """``(N,)`` payload on the flange beyond what the robot's model carries; 0 where none was recorded."""
+        return 0.0 if self.payload_kg is None else self.payload_kg
+
     def subset(self, rows: Array) -> Measurements:
         """The poses picked by an index or boolean array, in that order."""
         per_pose = ("q_rad", "p_ME", "R_ME", "time_s", "temperature_c", "payload_kg", "approach", "pose_id", "line")

@@ -41,7 +41,10 @@ def validate(model: CalibratedModel, measurements: Measurements) -> Validation:
     groups = measurements.groups()
     nominal, calibrated = (
         accuracy(X_ME, measurements.p_ME, measurements.R_ME, groups)
-        for X_ME in (model.predict_nominal(measurements.q_rad), model.predict(measurements.q_rad))
+        for X_ME in (
+            model.predict_nominal(measurements.q_rad),
+            model.predict(measurements.q_rad, measurements.extra_payload_kg),
+        )
     )
     return Validation(int(groups.max()) + 1, nominal, calibrated)
 
@@ -56,8 +59,9 @@ def refit_frames(model: CalibratedModel, measurements: Measurements) -> Calibrat
     """
     p_ME, R_ME = measurements.p_ME, measurements.R_ME
     _require_poses(measurements)
-    X_MB, X_FE = frames.register(model.flange_poses(measurements.q_rad), p_ME, R_ME)
-    _require_variety(model.flange_poses(measurements.q_rad), X_FE, measurements.has_orientation)
+    X_BF_real = model.flange_poses(measurements.q_rad, measurements.extra_payload_kg)
+    X_MB, X_FE = frames.register(X_BF_real, p_ME, R_ME)
+    _require_variety(X_BF_real, X_FE, measurements.has_orientation)
     X_BF = nominal_flange_poses(model.robot, measurements.q_rad)
     X_MB_nominal, X_FE_nominal = frames.register(X_BF, p_ME, R_ME)
     return replace(
