@@ -264,7 +264,6 @@ def fits_to_the_noise(spec, seed):
     return fit
 
 
-@pytest.mark.xfail(strict=True, reason="independent_columns holds the wrong two of axis 2: deviations of 55 mm")
 @pytest.mark.parametrize("seed", [1, 3])
 def test_an_arm_of_seven_joints_is_calibrated_to_the_noise_with_deviations_of_the_size_of_the_errors(
     seven_joint_arm, seed
@@ -360,14 +359,12 @@ def test_poses_that_are_all_alike_are_refused(real, joints):
     assert "joints that move" in text
 
 
-@pytest.mark.xfail(strict=True, reason="calibrate counts rows as different poses where there is no pose_id")
 def test_repeated_visits_count_as_one_pose_without_their_pose_id_too(real, joints):
     text = refusal(real.robot, measure(real, np.tile(joints[:3], (20, 1)), Campaign()))
     assert "too few poses" in text
     assert "found:    3" in text
 
 
-@pytest.mark.xfail(strict=True, reason="calibrate accepts data that leave base and probe undetermined")
 @pytest.mark.parametrize("moving", [0, 5], ids=["joint 1", "joint 6"])
 def test_poses_in_which_a_single_joint_moves_are_refused(real, joints, moving):
     q = np.tile(joints[:1], (40, 1))

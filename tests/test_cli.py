@@ -19,7 +19,6 @@ COMMANDS = ("calibrate", "validate", "correct", "preview", "export", "simulate",
 WELD_PATH = plants.models_dir() / "ur5" / "weld_path.csv"
 POSE_PATH = plants.models_dir() / "ur5" / "pose_path.csv"
 HEAVY = ("numpy", "scipy", "torch", "pydrake", "casadi", "pydantic", "yourdfpy", "meshcat")
-OVERWRITES = "the commands other than correct overwrite their own input without a word"
 
 
 class Outcome:
@@ -362,7 +361,6 @@ def test_correct_does_not_overwrite_the_program(truepath, cell, tmp_path):
     assert path.read_bytes() == WELD_PATH.read_bytes()
 
 
-@pytest.mark.xfail(strict=True, reason=OVERWRITES)
 def test_calibrate_does_not_overwrite_the_measured_data(truepath, cell, tmp_path):
     data = tmp_path / "measured.csv"
     data.write_bytes((cell / "measured.csv").read_bytes())
@@ -371,7 +369,6 @@ def test_calibrate_does_not_overwrite_the_measured_data(truepath, cell, tmp_path
     assert is_refused(outcome, "the output is the input")
 
 
-@pytest.mark.xfail(strict=True, reason=OVERWRITES)
 @pytest.mark.parametrize("command", ["correct", "export"])
 def test_a_calibration_is_not_overwritten_by_what_is_made_with_it(truepath, cell, tmp_path, command):
     calibration = tmp_path / "ur5.json"

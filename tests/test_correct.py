@@ -126,7 +126,6 @@ def test_a_path_of_poses_is_reached_within_a_micrometre_too(calibration, tmp_pat
     assert angles(reached @ model.X_FE, wanted).max() < MICRORADIAN
 
 
-@pytest.mark.xfail(strict=True, reason="independent_columns holds the wrong two of axis 2: deviations of 55 mm")
 def test_an_arm_of_seven_joints_is_corrected_within_a_micrometre(seven, seven_joint_arm):
     real, p_FE = DrakeArm(seven_joint_arm, seed=3), [0.05, -0.02, 0.1]
     fit = calibrate(seven, real.measure(random_joints(seven, 300, 3), p_FE, 0.02, seed=3))

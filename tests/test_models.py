@@ -128,14 +128,9 @@ class Cell:
     def collisions(self, q) -> set[tuple[str, str]]:
         """Names of the shapes that penetrate each other at q."""
         self.plant.SetPositions(self.context, q)
-        query = self.scene_graph.get_query_output_port().Eval(
-            self.scene_graph.GetMyContextFromRoot(self.root)
-        )
+        query = self.scene_graph.get_query_output_port().Eval(self.scene_graph.GetMyContextFromRoot(self.root))
         name = self.scene_graph.model_inspector().GetName
-        return {
-            (name(pair.id_A), name(pair.id_B))
-            for pair in query.ComputePointPairPenetration()
-        }
+        return {(name(pair.id_A), name(pair.id_B)) for pair in query.ComputePointPairPenetration()}
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -169,9 +164,7 @@ def read_columns(path: Path, columns: list[str]) -> tuple[list[str], np.ndarray]
         reader = csv.DictReader(file)
         assert reader.fieldnames == ["label", *columns]
         rows = list(reader)
-    return [row["label"] for row in rows], np.array(
-        [[float(row[column]) for column in columns] for row in rows]
-    )
+    return [row["label"] for row in rows], np.array([[float(row[column]) for column in columns] for row in rows])
 
 
 def read_weld_path(robot: str) -> tuple[list[str], np.ndarray, np.ndarray]:
@@ -184,9 +177,7 @@ def read_weld_path(robot: str) -> tuple[list[str], np.ndarray, np.ndarray]:
 def between(waypoints: np.ndarray, steps: int) -> np.ndarray:
     """The waypoints and the joint-space motion between them."""
     fractions = np.arange(steps) / steps
-    legs = (
-        waypoints[:-1, None] + fractions[:, None] * np.diff(waypoints, axis=0)[:, None]
-    )
+    legs = waypoints[:-1, None] + fractions[:, None] * np.diff(waypoints, axis=0)[:, None]
     return np.vstack([legs.reshape(-1, waypoints.shape[1]), waypoints[-1:]])
 
 
@@ -233,9 +224,7 @@ def test_centres_of_mass_lie_where_published(robot):
     context = plant.CreateDefaultContext()
     q = np.array([0.3, -1.1, 0.8, -0.4, 1.3, 2.0])
     plant.SetPositions(context, q)
-    for link, row, p in zip(
-        LINKS, dh_frames(robot, q), CENTRE_OF_MASS[robot], strict=True
-    ):
+    for link, row, p in zip(LINKS, dh_frames(robot, q), CENTRE_OF_MASS[robot], strict=True):
         body = plant.GetBodyByName(link)
         p_local = body.CalcSpatialInertiaInBodyFrame(context).get_com()
         actual = body.EvalPoseInWorld(context).multiply(p_local)
@@ -249,9 +238,7 @@ def test_urdf_needs_no_other_file(robot):
 
 @pytest.mark.filterwarnings("ignore:.*Scene.dump:DeprecationWarning")
 def test_yourdfpy_reads_the_same_robot(robot):
-    urdf = yourdfpy.URDF.load(
-        str(MODELS / robot / f"{robot}.urdf"), build_collision_scene_graph=True
-    )
+    urdf = yourdfpy.URDF.load(str(MODELS / robot / f"{robot}.urdf"), build_collision_scene_graph=True)
     assert tuple(urdf.actuated_joint_names) == JOINTS
     urdf.update_cfg(HOME)
     np.testing.assert_allclose(
@@ -281,9 +268,7 @@ def test_a_real_collision_is_seen(cell):
     folded_arm = np.array([0, -HALF_PI, 3.0, 0, 0, 0])
     assert "table" in str(cell.collisions(level_arm_in_the_table))
     own = f"{cell.robot}::"
-    assert any(
-        a.startswith(own) and b.startswith(own) for a, b in cell.collisions(folded_arm)
-    )
+    assert any(a.startswith(own) and b.startswith(own) for a, b in cell.collisions(folded_arm))
 
 
 # --- the cells ------------------------------------------------------------------------
@@ -356,9 +341,7 @@ def test_weld_path_keeps_limits_and_one_branch(cell):
 
 def test_weld_path_stays_away_from_singularities(cell):
     _, joints, _ = read_weld_path(cell.robot)
-    smallest = [
-        np.linalg.svd(cell.flange_jacobian(q), compute_uv=False)[-1] for q in joints
-    ]
+    smallest = [np.linalg.svd(cell.flange_jacobian(q), compute_uv=False)[-1] for q in joints]
     assert min(smallest) > 0.1
 
 
@@ -370,11 +353,7 @@ def test_weld_path_collides_with_nothing(cell):
 
 def test_weld_path_follows_the_plate_3_mm_above_it(cell):
     labels, joints, _ = read_weld_path(cell.robot)
-    weld = [
-        q
-        for label, q in zip(labels, joints, strict=True)
-        if label.startswith(("rectangle", "raster"))
-    ]
+    weld = [q for label, q in zip(labels, joints, strict=True) if label.startswith(("rectangle", "raster"))]
     assert len(weld) > 90
     for q in weld:
         x, y, z = cell.pose("tool_tip", q, relative_to="workpiece").translation()

@@ -396,7 +396,6 @@ def test_an_unknown_frame_is_refused_and_the_known_ones_are_told(load, seven_joi
     assert "flange" in caught.value.expected
 
 
-@pytest.mark.xfail(raises=RuntimeError, strict=True, reason="arm._named_frame passes on Drake's error")
 @pytest.mark.parametrize("argument", ["base_frame", "flange_frame"])
 def test_a_frame_name_that_several_other_models_have_is_refused(seven_joint_arm, argument):
     plant = MultibodyPlant(0.0)

@@ -70,13 +70,19 @@ def _find_instance(plant: MultibodyPlant) -> ModelInstanceIndex:
 
 
 def _named_frame(plant: MultibodyPlant, name: str | None, instance: ModelInstanceIndex) -> Frame | None:
+    from pydrake.multibody.tree import FrameIndex
+
     if name is None:
         return None
-    for where in ((instance,), ()):
-        if plant.HasFrameNamed(name, *where):
-            return plant.GetFrameByName(name, *where)
-    known = [plant.get_frame(i).name() for i in plant.GetFrameIndices(instance)]
-    raise InputError(f"no frame called {name!r} in the plant", expected="one of " + ", ".join(filter(None, known)))
+    frames = [plant.get_frame(FrameIndex(index)) for index in range(plant.num_frames())]
+    own = [frame for frame in frames if frame.model_instance() == instance]
+    found = [frame for frame in own if frame.name() == name] or [frame for frame in frames if frame.name() == name]
+    if len(found) != 1:
+        raise InputError(
+            f"no frame called {name!r} on the arm, and {len(found) or 'none'} elsewhere in the plant",
+            expected="one of " + ", ".join(frame.name() for frame in own if frame.name()),
+        )
+    return found[0]
 
 
 def _root_frame(plant: MultibodyPlant, flange: Frame, instance: ModelInstanceIndex) -> Frame:
@@ -85,10 +91,14 @@ def _root_frame(plant: MultibodyPlant, flange: Frame, instance: ModelInstanceInd
 
     inboard, body = inboard_joints(plant), flange.body()
     while (j := inboard.get(int(body.index()))) is not None:
-        parent = plant.get_joint(JointIndex(j)).parent_body()
-        if parent.model_instance() != instance:
+        joint = plant.get_joint(JointIndex(j))
+        # A model may start with a joint right on the world: then that is where it stands.
+        outside = joint.parent_body().model_instance() != instance
+        if outside and joint.type_name() != "revolute":
             break
-        body = parent
+        body = joint.parent_body()
+        if outside:
+            break
     return body.body_frame()
 
 

@@ -86,9 +86,11 @@ def calibrate(robot: NominalRobot, measurements: Measurements, effects: Sequence
     """
     _require_poses(robot, measurements)
     X_BF = nominal_flange_poses(robot, measurements.q_rad)
-    problem = PoseProblem(robot, measurements, *frames.register(X_BF, measurements.p_ME, measurements.R_ME))
+    X_MB, X_FE = frames.register(X_BF, measurements.p_ME, measurements.R_ME)
+    frames.require_variety(X_BF, X_FE, measurements.has_orientation)
+    problem = PoseProblem(robot, measurements, X_MB, X_FE)
     names = poe.parameter_names(robot.num_joints)
-    free = independent_columns(problem.evaluate(no_deviation(robot))[1], _order(names))
+    free = independent_columns(problem.evaluate(no_deviation(robot))[1], _rank(names))
     held = {int(i): REDUNDANT for i in np.flatnonzero(~free)}
     prior_sigma = np.array([PRIOR_WIDTH * name.prior_scale if name.group == "axis" else np.inf for name in names])
     kinematic = RobustFit(problem, free, prior_sigma)
@@ -136,24 +138,24 @@ def _describe(
     )
 
 
-def _order(names: tuple[poe.ParameterName, ...]) -> Array:
+def _rank(names: tuple[poe.ParameterName, ...]) -> Array:
     """Frames first, then axes from the tool inwards: what is redundant is then held at the base of the robot."""
-    rank = [-1 if name.joint is None else -name.joint + 1000 for name in names]
-    return np.argsort(rank, kind="stable")
+    return np.array([-np.inf if name.joint is None else -name.joint for name in names])
 
 
 def _require_poses(robot: NominalRobot, measurements: Measurements) -> None:
     m = 6 if measurements.has_orientation else 3
     num_parameters = 4 * robot.num_joints + m
-    needed, found = -(-num_parameters // m) + SPARE_POSES, int(measurements.groups().max(initial=-1)) + 1
+    needed = -(-num_parameters // m) + SPARE_POSES
+    found = len(np.unique(np.round(measurements.q_rad, 6), axis=0))
+    spread = np.ptp(measurements.q_rad, axis=0).max() if len(measurements) else np.inf
+    if len(measurements) > 1 and spread < LEAST_JOINT_SPREAD_RAD:
+        raise CalibrationError(
+            f"all poses are alike\n  expected: joints that move\n"
+            f"  found:    no joint moves by more than {spread:.2g} rad over {len(measurements)} rows"
+        )
     if found < needed:
         raise CalibrationError(
             f"too few poses for {num_parameters} parameters\n"
             f"  expected: at least {needed} different poses with {m} readings each\n  found:    {found}"
-        )
-    spread = np.ptp(measurements.q_rad, axis=0).max()
-    if spread < LEAST_JOINT_SPREAD_RAD:
-        raise CalibrationError(
-            f"all poses are alike\n  expected: joints that move\n"
-            f"  found:    no joint moves by more than {spread:.2g} rad over {found} poses"
         )

@@ -56,6 +56,7 @@ def calibrate(
     from truepath.pipeline import named_effects
     from truepath.readers import read_measurements, with_nominal_frames
 
+    _keep(output, data)
     with console.progress("calibrating") as say:
         say("reading the robot")
         nominal = _robot(robot)
@@ -112,7 +113,7 @@ def validate(
         if bound is not None and not value <= bound
     ]
     for text in missed:
-        console.err.print(f"[red]bound missed:[/red] {text}")
+        console.complain(f"bound missed: {text}")
     if missed:
         raise typer.Exit(1)
 
@@ -131,8 +132,7 @@ def correct(
     from truepath.files import write_atomically
     from truepath.pipeline import correct_toolpath
 
-    if output.exists() and output.resolve() == path.resolve():
-        raise InputError("the output is the input", file=output, expected="another file: the original is kept")
+    _keep(output, path, calibration)
     with console.progress("correcting"):
         corrected = correct_toolpath(path, load_calibration(calibration), max_correction_mm=max_correction_mm)
         write_atomically(output, corrected.text)
@@ -158,6 +158,7 @@ def preview(
     from truepath.pipeline import correct_toolpath
     from truepath.preview import write_preview
 
+    _keep(output, path, calibration)
     with console.progress("drawing"):
         loaded = load_calibration(calibration)
         corrected = correct_toolpath(path, loaded, max_correction_mm=max_correction_mm)
@@ -186,11 +187,12 @@ def export(
     from truepath.export import write_calibrated_urdf
     from truepath.model_files import find_urdf
 
+    _keep(output, calibration)
     loaded = load_calibration(calibration)
     urdf = find_urdf(robot or loaded.robot.source, tuple(loaded.robot.joint_names), loaded.robot.name)
     write_calibrated_urdf(loaded.model, urdf, output)
     if loaded.effects:
-        console.out.print("[yellow]a URDF is rigid: the named effects of the calibration are not in it[/yellow]")
+        console.warn("a URDF is rigid: the named effects of the calibration are not in it")
     console.out.print(f"written to {output}")
 
 
@@ -236,10 +238,17 @@ def demo(
     console.print_accuracy("on 200 fresh poses", result.validation.nominal, result.validation.calibrated)
     console.out.print(
         f"welding path, tool error computed by Drake: mean {result.before_mm.mean():.3f} mm as programmed, "
-        f"[bold]{result.after_mm.mean():.3f} mm corrected[/bold] "
+        f"{result.after_mm.mean():.3f} mm corrected "
         f"({result.before_mm.mean() / result.after_mm.mean():.0f} times better)"
     )
     console.out.print(f"see it: open {result.page.resolve()} in a browser")
+
+
+def _keep(output: Path, *inputs: Path) -> None:
+    """Refuses to write over what is read."""
+    for path in inputs:
+        if output.exists() and path.exists() and output.samefile(path):
+            raise InputError("the output is the input", file=output, expected="another file: the original is kept")
 
 
 def _robot(spec: str) -> NominalRobot:
@@ -259,15 +268,9 @@ def main() -> None:
     try:
         app()
     except TruepathError as error:
-        from truepath.console import err
+        from truepath.console import complain
 
-        err.print(f"[red]error:[/red] {_escape(str(error))}", soft_wrap=True)
+        complain(f"error: {error}")
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(130)
-
-
-def _escape(text: str) -> str:
-    from rich.markup import escape
-
-    return escape(text)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from truepath.iso9283 import Accuracy
 
 # Soft wrap: a path or a sentence is one line wherever it goes; terminals break lines by themselves.
-out = Console(highlight=False, soft_wrap=True)
-err = Console(stderr=True, highlight=False, soft_wrap=True)
+out = Console(highlight=False, markup=False, soft_wrap=True)
+err = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
 
 
 @contextmanager
@@ -27,6 +27,16 @@ def progress(title: str) -> Iterator[Callable[[str], None]]:
     """A spinner while work goes on; the yielded function says what is being done now."""
     with err.status(title) as status:
         yield lambda text: status.update(f"{title}: {text}")
+
+
+def warn(text: str) -> None:
+    """Something that a person should not overlook, among the results."""
+    out.print(text, style="yellow")
+
+
+def complain(text: str) -> None:
+    """Why the exit code is not 0."""
+    err.print(text, style="red")
 
 
 def print_json(content: Any) -> None:
@@ -64,13 +74,13 @@ def print_calibration(calibration: Calibration) -> None:
     """What a person wants to know after calibrating."""
     data, noise = calibration.data, calibration.noise
     kind = "6D" if data.has_orientation else "3D"
-    out.print(f"[bold]{calibration.robot.name}[/bold] calibrated on {data.poses} poses ({kind}) of {data.file}")
+    out.print(f"{calibration.robot.name} calibrated on {data.poses} poses ({kind}) of {data.file}", style="bold")
     if calibration.heldout is not None:
         held_out = calibration.heldout
         title = f"on {held_out.poses} poses that the fit had not seen"
         print_accuracy(title, held_out.nominal, held_out.calibrated, held_out.kinematic)
     else:
-        out.print("[yellow]too few poses to hold any back: the accuracy on new poses is not known[/yellow]")
+        warn("too few poses to hold any back: the accuracy on new poses is not known")
     spread = f"{noise.position_mm:.4f} mm per axis"
     if noise.orientation_mrad is not None:
         spread += f", {noise.orientation_mrad:.4f} mrad per axis"
@@ -78,10 +88,10 @@ def print_calibration(calibration: Calibration) -> None:
     for name in dict.fromkeys(effect.name for effect in calibration.effects):
         found = [effect for effect in calibration.effects if effect.name == name]
         joints = ", ".join(str(effect.joint) for effect in found)
-        out.print(f"[bold]{name}[/bold] on joint {joints}: {found[0].cause}; {found[0].remedy}")
+        out.print(f"{name} on joint {joints}: {found[0].cause}; {found[0].remedy}")
     if data.outlier_lines:
         shown = ", ".join(map(str, data.outlier_lines[:12])) + (" ..." if len(data.outlier_lines) > 12 else "")
-        out.print(f"[yellow]{len(data.outlier_lines)} outliers left out, lines {shown}[/yellow]")
+        warn(f"{len(data.outlier_lines)} outliers left out, lines {shown}")
     held = [p for p in calibration.parameters if p.status == "held"]
     for reason in dict.fromkeys(p.reason for p in held):
         names = ", ".join(p.name for p in held if p.reason == reason)
@@ -114,4 +124,4 @@ def print_correction(correction: Correction) -> None:
         f"{after.max():.1e} mm after, on top of what the calibration leaves unexplained"
     )
     for warning in correction.warnings:
-        out.print(f"[yellow]warning:[/yellow] {warning}")
+        warn(f"warning: {warning}")

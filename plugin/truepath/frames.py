@@ -21,6 +21,7 @@ SETTLED = 1e-7  # m and rad: far below what the fit that follows will change
 STUDENT_DOF = 3.0
 SUBSETS, SUBSET_SIZE = 64, 12
 SUSPICIOUS_MISFIT_M, MAX_MEDIAN_MISFIT_M = 0.005, 0.1
+WORST_CONDITION = 100.0  # of the equations for the frames; good poses have 10, lengths being in metres
 
 
 def register(
@@ -63,6 +64,26 @@ def register(
 
 def _median_misfit(X_BF: Array, p_ME: Array, X_MB: Array, X_FE: Array) -> float:
     return float(np.median(np.linalg.norm((X_MB @ X_BF @ X_FE)[:, :3, 3] - p_ME, axis=1)))
+
+
+def require_variety(X_BF: Array, X_FE: Array, has_orientation: bool) -> None:
+    """The poses ``(N, 4, 4)`` must tell a moved base from a moved probe.
+
+    Raises:
+        CalibrationError: the derivatives of the readings by the frames are nearly dependent.
+    """
+    R, points = X_BF[:, :3, :3], (X_BF @ X_FE)[:, :3, 3]
+    same, none = np.broadcast_to(np.eye(3), R.shape), np.zeros(R.shape)
+    J = np.concatenate([-lie.skew(points), same, R], axis=2)  # turn and shift of the base, shift of the probe
+    if has_orientation:
+        turn = np.concatenate([same, none, none, R], axis=2)
+        J = np.concatenate([np.concatenate([J, none], axis=2), turn], axis=1)
+    condition = np.linalg.cond(J.reshape(-1, J.shape[2]))
+    if not condition <= WORST_CONDITION:
+        raise CalibrationError(
+            "the poses are too much alike to find base and probe\n  expected: joints that move, of wrist and arm\n"
+            f"  found:    equations of condition {condition:.3g}, more than {WORST_CONDITION:g}"
+        )
 
 
 def _student_weights(distance_m: Array) -> Array:

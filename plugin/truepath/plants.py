@@ -38,11 +38,15 @@ def resolve(spec: str | Path) -> Path:
     if str(spec) in BUILT_IN:
         return models_dir() / BUILT_IN[str(spec)]
     path = Path(spec)
-    if not path.is_file() or not path.name.endswith((".urdf", ".dmd.yaml")):
+    try:
+        exists, is_file = path.exists(), path.is_file()
+    except (OSError, ValueError):  # no name that a file could have
+        exists = is_file = False
+    if not is_file or not path.name.endswith((".urdf", ".dmd.yaml")):
         raise InputError(
             f"no robot {str(spec)!r}",
             expected=f"a built-in name ({', '.join(BUILT_IN)}) or an existing .urdf or .dmd.yaml file",
-            found="no such file" if not path.exists() else "a file of another kind",
+            found="a file of another kind" if exists else "no such file",
         )
     return path
 

@@ -9,7 +9,7 @@ from truepath.levenberg_marquardt import CONVERGED_CHI2, Solution, covariance, m
 from truepath.lie import Array
 from truepath.poe_symbolic import PoseProblem
 
-ROBUST_ROUNDS, MAX_ROUNDS = 3, 30
+ROBUST_ROUNDS, MAX_ROUNDS = 20, 30
 NEAR_ENOUGH = 0.1  # of half the chi-square
 OUTLIER_PROBABILITY = 1e-3  # of calling any row of a clean data set an outlier
 OUTLIER_MARGIN = 1.5  # what is left of an imperfect model has longer tails than noise
@@ -43,7 +43,14 @@ class RobustFit:
     def run(self) -> list[int]:
         """Fits. Returns the parameters that turned out to be unseen and are free no longer: then run again."""
         for _ in range(ROBUST_ROUNDS):
+            # Gross errors must not widen the noise that they are judged by: it comes from the median here.
+            before = self.sigma
             self._step(None, tolerance=NEAR_ENOUGH)
+            spent = len(self.solution.x) / len(self.groups) / 3 / len(self.solution.residual)
+            medians = [_median_noise(self.solution.residual[:, group]) for group in self.groups]
+            self.sigma = np.repeat(medians, 3) / np.sqrt(max(1.0 - spent, 0.1))
+            if np.allclose(self.sigma, before, rtol=0.05):
+                break
         if unseen := self._drop_unseen():
             return unseen
         inlier = inliers(self.solution.residual, self.sigma)

@@ -6,16 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from truepath import frames, lie
+from truepath import frames
 from truepath.errors import CalibrationError
 from truepath.iso9283 import Accuracy, accuracy
-from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel, nominal_flange_poses
 
 SCHEMA = "truepath.validation/1"
 FEWEST_POSES = {3: 4, 6: 3}  # by readings a pose: fewer leave several placements that fit as well
-WORST_CONDITION = 100.0  # of the equations for the frames; good poses have 10, lengths being in metres
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def refit_frames(model: CalibratedModel, measurements: Measurements) -> Calibrat
     _require_poses(measurements)
     X_BF_real = model.flange_poses(measurements.q_rad, measurements.extra_payload_kg)
     X_MB, X_FE = frames.register(X_BF_real, p_ME, R_ME)
-    _require_variety(X_BF_real, X_FE, measurements.has_orientation)
+    frames.require_variety(X_BF_real, X_FE, measurements.has_orientation)
     X_BF = nominal_flange_poses(model.robot, measurements.q_rad)
     X_MB_nominal, X_FE_nominal = frames.register(X_BF, p_ME, R_ME)
     return replace(
@@ -82,20 +80,4 @@ def _require_poses(measurements: Measurements) -> None:
         raise CalibrationError(
             "too few poses to find the frames again\n"
             f"  expected: at least {needed} different poses\n  found:    {found}"
-        )
-
-
-def _require_variety(X_BF: Array, X_FE: Array, has_orientation: bool) -> None:
-    """The poses must tell a moved base from a moved probe: looks at the derivatives of the readings, in B."""
-    R, points = X_BF[:, :3, :3], (X_BF @ X_FE)[:, :3, 3]
-    same, none = np.broadcast_to(np.eye(3), R.shape), np.zeros(R.shape)
-    J = np.concatenate([-lie.skew(points), same, R], axis=2)  # turn and shift of the base, shift of the probe
-    if has_orientation:
-        turn = np.concatenate([same, none, none, R], axis=2)
-        J = np.concatenate([np.concatenate([J, none], axis=2), turn], axis=1)
-    condition = np.linalg.cond(J.reshape(-1, J.shape[2]))
-    if not condition <= WORST_CONDITION:
-        raise CalibrationError(
-            "the poses are too much alike to find the frames again\n  expected: joints that move, of wrist and arm\n"
-            f"  found:    equations of condition {condition:.3g}, more than {WORST_CONDITION:g}"
         )
