@@ -136,9 +136,27 @@ def test_the_context_is_read(read, sheet):
 
 
 def test_equal_pose_ids_whatever_their_text_are_visits_of_one_pose(read, sheet):
+    for name in JOINTS:
+        sheet.set(name, 4, sheet.columns[name][0])
     groups = read(sheet.add(pose_id=["left", "right", "left"])).groups()
     assert groups[0] == groups[2] != groups[1]
     assert sorted(set(groups)) == [0, 1]
+
+
+def test_one_pose_id_for_different_joints_is_refused(refusal, sheet):
+    error = refusal(sheet.add(pose_id=["left", "right", "left"]))
+    assert place(error) == ("one pose_id stands for different poses", 4, "pose_id")
+    assert "line 2" in error.expected
+
+
+def test_a_negative_payload_is_refused(refusal, sheet):
+    error = refusal(sheet.add(payload_kg=["0", "1.5", "-0.1"]))
+    assert place(error) == ("a payload cannot be negative", 4, "payload_kg")
+
+
+def test_an_approach_of_a_joint_that_the_robot_does_not_have_is_refused(refusal, sheet):
+    directions = {f"approach{i}": ["1", "0", "-1"] for i in range(1, 8)}
+    assert place(refusal(sheet.add(**directions)))[2] == "approach7"
 
 
 def test_without_pose_ids_every_row_is_a_pose_of_its_own(read, sheet):

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truepath.errors import InputError, TruepathError
+from truepath import __version__
+from truepath.errors import TruepathError
 
 if TYPE_CHECKING:
     from truepath.robot import NominalRobot
 
+MOVED = 10.0  # times the error on held-out poses: that is no calibration that aged
+
 app = typer.Typer(
     name="truepath",
-    help="Measure a robot, learn where it really goes, correct its offline programs, prove the gain.",
     epilog="Exit codes: 0 good, 1 a stated bound was missed, 2 bad input.",
     no_args_is_help=True,
     add_completion=False,
@@ -27,9 +29,25 @@ DataFile = Annotated[Path, typer.Argument(help="measured poses", show_default=Fa
 Format = Annotated[str, typer.Option("--format", help="csv, or a published set: jacobi2025, landgraf2021")]
 RobotSpec = Annotated[str, typer.Option("--robot", help="ur5, ur10, ur5_cell, ur10_cell, a .urdf or a .dmd.yaml")]
 CalibrationFile = Annotated[Path, typer.Option("--calibration", "-c", help="calibration.json", show_default=False)]
+RobotCheck = Annotated[str | None, typer.Option("--robot", help="refuse a calibration of any other robot")]
 Json = Annotated[bool, typer.Option("--json", help="print JSON for machines instead of text")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="file to write", show_default=False)]
 MaxCorrection = Annotated[float, typer.Option("--max-correction-mm", help="refuse to move any target further")]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"truepath {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="print the version and stop")
+    ] = False,
+) -> None:
+    """Measure a robot, learn where it really goes, correct its offline programs, prove the gain."""
 
 
 @app.command()
@@ -53,17 +71,18 @@ def calibrate(
     """Learn the real robot from measured poses and write a calibration file."""
     from truepath import console
     from truepath.learn import learn
-    from truepath.pipeline import named_effects
+    from truepath.pipeline import keep, named_effects, naming
     from truepath.readers import read_measurements, with_nominal_frames
 
-    _keep(output, data)
+    keep(output, data)
     with console.progress("calibrating") as say:
         say("reading the robot")
         nominal = _robot(robot)
         say("reading the data")
         measurements = read_measurements(data, nominal, format)
         measurements = with_nominal_frames(measurements, *_stated_frames(nominal, measured_in, probe))
-        calibration, _ = learn(nominal, measurements, effects=named_effects(effects), source=robot, progress=say)
+        with naming(data):
+            calibration, _ = learn(nominal, measurements, effects=named_effects(effects), source=robot, progress=say)
         calibration.save(output)
     if json:
         content = calibration.model_dump(by_alias=True, include={"robot": {"name", "model_sha256"}})
@@ -81,7 +100,7 @@ def validate(
     data: DataFile,
     calibration: CalibrationFile,
     format: Format = "csv",
-    robot: Annotated[str | None, typer.Option("--robot", help="check that the calibration is of this robot")] = None,
+    robot: RobotCheck = None,
     refit_frames: Annotated[
         Path | None, typer.Option(help="a few other poses: estimate base and probe anew first (the tracker was moved)")
     ] = None,
@@ -93,19 +112,27 @@ def validate(
     from truepath import console
     from truepath import validate as validation
     from truepath.calibration import load_calibration
+    from truepath.pipeline import naming
     from truepath.readers import read_measurements
 
     with console.progress("validating"):
-        model = load_calibration(calibration, None if robot is None else _robot(robot)).model
+        loaded = load_calibration(calibration, None if robot is None else _robot(robot))
+        model = loaded.model
         measurements = read_measurements(data, model.robot, format)
         if refit_frames is not None:
-            model = validation.refit_frames(model, read_measurements(refit_frames, model.robot, format))
+            with naming(refit_frames):
+                model = validation.refit_frames(model, read_measurements(refit_frames, model.robot, format))
         result = validation.validate(model, measurements)
     if json:
         console.print_json(result.to_dict())
     else:
         console.print_accuracy(f"{result.poses} poses of {data}", result.nominal, result.calibrated)
     position = result.calibrated.position_mm
+    if refit_frames is None and loaded.heldout and position.mean > MOVED * loaded.heldout.calibrated.position_mm.mean:
+        console.complain(
+            f"far worse than the {loaded.heldout.calibrated.position_mm.mean:.3f} mm on held-out poses: if tracker, "
+            "robot or probe were moved since, find the frames again with --refit-frames"
+        )
     bounds = (("mean", position.mean, max_mean_mm), ("largest", position.max, max_max_mm))
     missed = [
         f"the {name} position error is {value:.4f} mm, more than {bound:g} mm"
@@ -123,6 +150,7 @@ def correct(
     path: Annotated[Path, typer.Argument(help="toolpath CSV: joint columns, or flange poses", show_default=False)],
     calibration: CalibrationFile,
     output: Output,
+    robot: RobotCheck = None,
     max_correction_mm: MaxCorrection = 5.0,
     json: Json = False,
 ) -> None:
@@ -130,11 +158,12 @@ def correct(
     from truepath import console
     from truepath.calibration import load_calibration
     from truepath.files import write_atomically
-    from truepath.pipeline import correct_toolpath
+    from truepath.pipeline import correct_toolpath, keep
 
-    _keep(output, path, calibration)
+    keep(output, path, calibration)
     with console.progress("correcting"):
-        corrected = correct_toolpath(path, load_calibration(calibration), max_correction_mm=max_correction_mm)
+        loaded = load_calibration(calibration, None if robot is None else _robot(robot))
+        corrected = correct_toolpath(path, loaded, max_correction_mm=max_correction_mm)
         write_atomically(output, corrected.text)
     if json:
         console.print_json({"output": str(output), **corrected.correction.summary()})
@@ -155,10 +184,10 @@ def preview(
     """Show a path as programmed, as the real robot would go, and as corrected: one HTML page."""
     from truepath import console
     from truepath.calibration import load_calibration
-    from truepath.pipeline import correct_toolpath
+    from truepath.pipeline import correct_toolpath, keep
     from truepath.preview import write_preview
 
-    _keep(output, path, calibration)
+    keep(output, path, calibration)
     with console.progress("drawing"):
         loaded = load_calibration(calibration)
         corrected = correct_toolpath(path, loaded, max_correction_mm=max_correction_mm)
@@ -186,8 +215,9 @@ def export(
     from truepath.calibration import load_calibration
     from truepath.export import write_calibrated_urdf
     from truepath.model_files import find_urdf
+    from truepath.pipeline import keep
 
-    _keep(output, calibration)
+    keep(output, calibration)
     loaded = load_calibration(calibration)
     urdf = find_urdf(robot or loaded.robot.source, tuple(loaded.robot.joint_names), loaded.robot.name)
     write_calibrated_urdf(loaded.model, urdf, output)
@@ -242,13 +272,6 @@ def demo(
         f"({result.before_mm.mean() / result.after_mm.mean():.0f} times better)"
     )
     console.out.print(f"see it: open {result.page.resolve()} in a browser")
-
-
-def _keep(output: Path, *inputs: Path) -> None:
-    """Refuses to write over what is read."""
-    for path in inputs:
-        if output.exists() and path.exists() and output.samefile(path):
-            raise InputError("the output is the input", file=output, expected="another file: the original is kept")
 
 
 def _robot(spec: str) -> NominalRobot:

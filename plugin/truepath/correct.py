@@ -195,7 +195,8 @@ def _warnings(outside: Array, singular: Array, line: Array) -> list[str]:
     if outside.any():
         warnings.append(
             f"{int(outside.sum())} of {len(outside)} waypoints lie outside the joints that were measured "
-            f"(first in line {int(line[np.argmax(outside)])}): only the rigid kinematics is extrapolated there"
+            f"(first in line {int(line[np.argmax(outside)])}): there the kinematics is extrapolated, and named effects "
+            "fade out joint by joint"
         )
     near = singular < NEAR_SINGULAR
     if near.any():

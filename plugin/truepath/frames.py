@@ -16,8 +16,8 @@ from truepath import lie
 from truepath.errors import CalibrationError
 from truepath.lie import Array
 
-REFINEMENTS = 40
-SETTLED = 1e-7  # m and rad: far below what the fit that follows will change
+FIRST_REFINEMENTS, REFINEMENTS = 4, 40
+SETTLED = 1e-7  # m and rad
 STUDENT_DOF = 3.0
 SUBSETS, SUBSET_SIZE = 64, 12
 SUSPICIOUS_MISFIT_M, MAX_MEDIAN_MISFIT_M = 0.005, 0.1
@@ -107,8 +107,10 @@ def _register_points(X_BF: Array, p_ME: Array, X_MB: Array | None, X_FE: Array |
     """Best of several closed-form starts after robust Gauss-Newton on base (6) and reflector point (3)."""
     p_FE = np.zeros(3) if X_FE is None else X_FE[:3, 3]
     starts = [(X_MB, p_FE)] if X_MB is not None else _point_starts(X_BF, p_ME, p_FE)
-    refined = [_refine_points(X_BF, p_ME, *start, X_MB is None, X_FE is None) for start in starts]
-    _, best_X_MB, best_p_FE = min(refined, key=lambda item: item[0])
+    free = X_MB is None, X_FE is None
+    refined = [_refine_points(X_BF, p_ME, *start, *free, FIRST_REFINEMENTS) for start in starts]
+    _, X_MB_near, p_FE_near = min(refined, key=lambda item: item[0])
+    _, best_X_MB, best_p_FE = _refine_points(X_BF, p_ME, X_MB_near, p_FE_near, *free, REFINEMENTS)
     return best_X_MB, (lie.make_pose(translation=best_p_FE) if X_FE is None else X_FE)
 
 
@@ -138,11 +140,11 @@ def _linear_points(X_BF: Array, p_ME: Array) -> tuple[Array, Array]:
 
 
 def _refine_points(
-    X_BF: Array, p_ME: Array, X_MB: Array, p_FE: Array, free_base: bool, free_tool: bool
+    X_BF: Array, p_ME: Array, X_MB: Array, p_FE: Array, free_base: bool, free_tool: bool, iterations: int
 ) -> tuple[float, Array, Array]:
     """Robust Gauss-Newton; returns the median distance, X_MB and p_FE."""
     N = len(p_ME)
-    for _ in range(REFINEMENTS):
+    for _ in range(iterations):
         R_MF = X_MB[:3, :3] @ X_BF[:, :3, :3]
         points = R_MF @ p_FE + X_BF[:, :3, 3] @ X_MB[:3, :3].T
         residual = points + X_MB[:3, 3] - p_ME

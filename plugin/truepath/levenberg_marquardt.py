@@ -18,6 +18,7 @@ Evaluate = Callable[[Array], tuple[Array, Array]]
 
 STUDENT_DOF = 4.0
 MAX_ITERATIONS = 100
+LIGHT_DAMPING = 1e-6
 NO_CONVERGENCE = f"the fit did not converge in {MAX_ITERATIONS} evaluations of the model"
 CONVERGED_CHI2 = 1e-6  # of a change in chi-square that no statistics could ever see
 
@@ -72,13 +73,16 @@ def minimise(
     residual, jacobian = evaluate(x) if evaluated is None else evaluated
     cost, weights = _loss(residual / sigma, inlier)
     cost += 0.5 * float(np.sum(precision * x**2))
-    damping, iterations = 1e-6, int(evaluated is None)
+    damping, iterations = LIGHT_DAMPING, int(evaluated is None)
     while iterations < MAX_ITERATIONS:
         H, gradient = _normal_equations(residual / sigma, jacobian / sigma[:, None], weights)
         H, gradient = H + np.diag(np.broadcast_to(precision, x.shape)), gradient + precision * x
         while True:
             step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), gradient)
             predicted = -(gradient @ step) - 0.5 * step @ H @ step
+            if predicted < tolerance and damping <= LIGHT_DAMPING:
+                # So small a step needs no evaluation: the model is linear over it.
+                return Solution(x + step, residual + jacobian @ step, jacobian, weights, precision, iterations)
             trial = evaluate(x + step)
             iterations += 1
             trial_cost, trial_weights = _loss(trial[0] / sigma, inlier)

@@ -19,6 +19,7 @@ from truepath.robot import NominalRobot
 from truepath.tables import Table
 
 OTHER_UNITS = {"t": "s", "temperature": "c", "payload": "kg"}
+SAME_POSE_RAD = 1e-3
 LIMIT_TOLERANCE_RAD = np.radians(2.0)
 
 
@@ -103,6 +104,7 @@ def from_table(table: Table, num_joints: int) -> Measurements:
     """
     _check_units(table, num_joints)
     q_names, q_factor = unit_columns(table, [f"q{i + 1}" for i in range(num_joints)], ANGLE_UNITS)
+    q_rad = table.numbers(q_names) * q_factor
     p_names, p_factor = unit_columns(table, ["x", "y", "z"], LENGTH_UNITS)
     R_ME = None
     if any(name in table.header for name in QUATERNION_COLUMNS):
@@ -130,13 +132,17 @@ def from_table(table: Table, num_joints: int) -> Measurements:
         names = np.array(table.text("pose_id"))
         _reject(table, (names == "")[:, None], ["pose_id"], "the name of a pose is missing", "a name in every row")
         pose_id = np.unique(names, return_inverse=True)[1]
+        _require_same_joints(table, q_rad, pose_id)
+    payload_kg = _optional(table, "payload_kg")
+    if payload_kg is not None:
+        _reject(table, (payload_kg < 0)[:, None], ["payload_kg"], "a payload cannot be negative", "0 or more")
     return Measurements(
-        q_rad=table.numbers(q_names) * q_factor,
+        q_rad=q_rad,
         p_ME=table.numbers(p_names) * p_factor,
         R_ME=R_ME,
         time_s=time_s,
         temperature_c=_optional(table, "temperature_c"),
-        payload_kg=_optional(table, "payload_kg"),
+        payload_kg=payload_kg,
         approach=approach,
         pose_id=pose_id,
         line=table.lines,
@@ -172,10 +178,29 @@ def check_joint_limits(measurements: Measurements, robot: NominalRobot, file: st
     )
 
 
+def _require_same_joints(table: Table, q_rad: Array, pose_id: Array) -> None:
+    """Visits of one pose must command the same joints, or their barycentre means nothing."""
+    first = np.unique(pose_id, return_index=True)[1]
+    off = np.abs(q_rad - q_rad[first[pose_id]]).max(axis=1)
+    if off.max() > SAME_POSE_RAD:
+        k = int(np.argmax(off > SAME_POSE_RAD))
+        raise InputError(
+            "one pose_id stands for different poses",
+            file=table.file,
+            line=int(table.lines[k]),
+            column="pose_id",
+            expected=f"the joints of line {int(table.lines[first[pose_id[k]]])}, the first visit of this pose",
+            found=f"a joint that differs by {off[k]:.4g} rad",
+        )
+
+
 def _check_units(table: Table, num_joints: int) -> None:
     """Every name of the vocabulary that carries an unknown unit, or a joint that the robot does not have."""
     joints = [f"q{i + 1}" for i in range(num_joints)]
+    approaches = [f"approach{i + 1}" for i in range(num_joints)]
     for name in table.header:
+        if re.fullmatch(r"approach\d+", name) and name not in approaches:
+            raise _no_such_joint(table, name, f"approach1 to approach{num_joints}")
         match = re.fullmatch(r"(q\d+|x|y|z|t|temperature|payload)_([A-Za-z]+)", name)
         if not match:
             continue
@@ -194,13 +219,12 @@ def _check_units(table: Table, num_joints: int) -> None:
                 found=name,
             )
         if quantity[0] == "q" and quantity not in joints:
-            raise InputError(
-                "a column for a joint that the robot does not have",
-                file=table.file,
-                line=1,
-                column=name,
-                expected=f"q1 to q{num_joints}",
-            )
+            raise _no_such_joint(table, name, f"q1 to q{num_joints}")
+
+
+def _no_such_joint(table: Table, name: str, expected: str) -> InputError:
+    problem = "a column for a joint that the robot does not have"
+    return InputError(problem, file=table.file, line=1, column=name, expected=expected)
 
 
 def _optional(table: Table, name: str) -> Array | None:

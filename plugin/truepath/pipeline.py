@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,7 +15,7 @@ from truepath import lie
 from truepath.calibration import Calibration
 from truepath.correct import MAX_CORRECTION_MM, Correction, correct
 from truepath.effects import effect_named
-from truepath.errors import InputError
+from truepath.errors import CalibrationError, InputError
 from truepath.files import write_atomically
 from truepath.inverse import joints_along_path
 from truepath.lie import Array
@@ -30,6 +32,15 @@ class CorrectedToolpath:
     q_programmed: Array
     correction: Correction
     text: str
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """Puts the name of the data file before what a fit complains about: the fit itself knows no files."""
+    try:
+        yield
+    except CalibrationError as error:
+        raise CalibrationError(f"{file}: {error}") from None
 
 
 def correct_toolpath(
@@ -49,6 +60,13 @@ def correct_toolpath(
         q = joints_along_path(model.robot, toolpath.X_BF, region, line, file)
     correction = correct(model, q, region=region, line=line, file=file, max_correction_mm=max_correction_mm)
     return CorrectedToolpath(toolpath, q, correction, toolpath.with_joints(correction.q_rad))
+
+
+def keep(output: Path, *inputs: Path) -> None:
+    """Refuses to write over what is read."""
+    for path in inputs:
+        if output.exists() and path.exists() and output.samefile(path):
+            raise InputError("the output is the input", file=output, expected="another file: the original is kept")
 
 
 def named_effects(text: str) -> tuple[str, ...] | Literal["auto"]:
@@ -76,7 +94,10 @@ def stated_probe(robot: NominalRobot, probe: str) -> Array | None:
         return None
     if probe == "model":
         if robot.X_FR is None:
-            raise InputError(f"the model of {robot.name} has no frame called 'reflector'", expected="--probe x,y,z")
+            raise InputError(
+                f"the model of {robot.name} has no frame called 'reflector'",
+                expected="--probe x,y,z, or a cell with a reflector (ur5_cell, ur10_cell)",
+            )
         return robot.X_FR
     try:
         offset = np.array([float(part) for part in probe.split(",")])

@@ -72,7 +72,7 @@ def _read_jacobi2025(path: Path, robot: NominalRobot) -> Measurements:
     """P. Jacobi, master's thesis, Tsinghua University, 2025: UR5, laser tracker, one reflector.
 
     Measured = target + difference, in the robot's base frame; the reflector is meant to sit at
-    (0, 0, 31) mm on the flange, which the targets agree with to 0.01 mm.
+    (0, 0, 31) mm on the flange, which the targets agree with but for a constant 0.09 mm in z.
     """
     table = read_table(path)
     joints = [f"joint_{i + 1}" for i in range(6)]
