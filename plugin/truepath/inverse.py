@@ -54,12 +54,12 @@ def solve(forward: ForwardAndJacobian, X_goal: Array, q_start: Array, *, max_ite
     """
     q = np.array(q_start, float)
     error = np.full((len(q), 6), np.inf)
-    smallest = np.zeros(len(q))
+    jacobian = np.zeros((len(q), 6, q.shape[1]))
     active = np.arange(len(q))
     for iteration in range(max_iterations + 1):
         X, J = forward(q[active])
         error[active] = lie.pose_error(X_goal[active], X)
-        smallest[active] = np.linalg.svd(J, compute_uv=False)[:, -1]
+        jacobian[active] = J
         done = _within_tolerance(error[active])
         active, J = active[~done], J[~done]
         if len(active) == 0 or iteration == max_iterations:
@@ -70,6 +70,7 @@ def solve(forward: ForwardAndJacobian, X_goal: Array, q_start: Array, *, max_ite
         longest = np.abs(step).max(axis=1, keepdims=True)
         q[active] += step * np.minimum(1.0, MAX_STEP_RAD / np.maximum(longest, 1e-300))
     angle, position = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
+    smallest = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
     return InverseSolution(q, _within_tolerance(error), position, angle, smallest)
 
 
