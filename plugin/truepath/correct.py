@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from truepath import inverse, lie
+from truepath import inverse
 from truepath.errors import CorrectionError, InputError
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
@@ -205,14 +205,3 @@ def _warnings(outside: Array, singular: Array, line: Array) -> list[str]:
             f"smallest singular value {singular.min():.3g}): small errors need large joint motions there"
         )
     return warnings
-
-
-def predicted_deviation(model: CalibratedModel, q_programmed: Array, q_commanded: Array) -> Array:
-    """``(N, 6)`` rotation and translation by which the real tool misses what the program means, in the base frame.
-
-    Args:
-        q_programmed: ``(N, n)`` joints of the program, which say what it means.
-        q_commanded: ``(N, n)`` joints that the robot is sent to.
-    """
-    goal = model.goal_flange_poses(nominal_flange_poses(model.robot, q_programmed)) @ model.X_FE
-    return lie.pose_error(model.flange_poses(q_commanded) @ model.X_FE, goal)

@@ -87,7 +87,6 @@ class PoseProblem:
 
     def __init__(self, robot: NominalRobot, measurements: Measurements, X_MB: Array, X_FE: Array) -> None:
         self.robot, self.X_MB, self.X_FE = robot, X_MB, X_FE
-        self.num_poses = len(measurements)
         self.components = 6 if measurements.has_orientation else 3
         n = robot.num_joints
         inputs = [np.zeros((4 * (n + 1), 3)), measurements.q_rad, measurements.p_ME]
