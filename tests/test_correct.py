@@ -15,7 +15,7 @@ from truepath.errors import CorrectionError, InputError
 from truepath.export import set_calibrated_frames
 from truepath.inverse import solve
 from truepath.learn import learn
-from truepath.model import nominal_model
+from truepath.model import nominal_flange_poses, nominal_model
 from truepath.pipeline import correct_toolpath
 from truepath.programs.toolpath_csv import read_toolpath
 from truepath.region import cover
