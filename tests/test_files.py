@@ -91,7 +91,7 @@ def test_a_folder_that_does_not_exist_is_told_with_the_path(tmp_path):
 
 
 def test_a_folder_is_not_overwritten(target):
-    with pytest.raises(InputError, match="cannot write this file"):
+    with pytest.raises(InputError, match="the output is no file"):
         write_atomically(target.parent, "x")
     assert target.read_bytes() == b"old content"
     assert list(target.parent.parent.iterdir()) == [target.parent]

@@ -96,9 +96,9 @@ def test_all_folds_find_the_same_robot(ur5_folds):
     assert len({frozenset(fit.held) for fit, _ in ur5_folds}) == 1
 
 
-def test_the_reflector_on_its_axis_leaves_the_tilt_of_axis_6_unseen(ur5_folds):
+def test_the_reflector_on_its_axis_leaves_the_tilt_of_axis_6_barely_seen(ur5_folds):
     for fit, _ in ur5_folds:
-        assert {"axis6.rot_x", "axis6.rot_y"} <= {str(fit.names[i]) for i in fit.held}
+        assert "axis6.rot_x" in {str(fit.names[i]) for i in fit.barely_seen}
 
 
 def test_the_reflector_is_found_to_sit_on_the_axis_of_joint_6_as_it_was_said_to(ur5_folds):

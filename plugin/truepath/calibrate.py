@@ -26,7 +26,7 @@ from truepath.robust_fit import RobustFit
 SPARE_POSES = 3
 PRIOR_WIDTH = 3.0  # times the plausible size: wide enough not to matter where the data says anything
 REDUNDANT = "redundant: other free parameters have the same effect"
-NOT_SEEN = f"not seen: the data leaves it more uncertain than {PRIOR_WIDTH:.0f} times its plausible size"
+BARELY_SEEN = f"barely seen: kept plausible (within {PRIOR_WIDTH:.0f} mm or mrad) more by assumption than by the data"
 LEAST_JOINT_SPREAD_RAD = 1e-3
 
 
@@ -39,6 +39,8 @@ class Fit:
         names: k parameter names, in the order of model.p.
         covariance: ``(k, k)``, zero rows for held parameters; of the frames it tells about small steps.
         held: number of a parameter to the reason why it stays at nominal.
+        barely_seen: numbers of parameters about which the wide prior says more than the data. They stay free,
+            so that the uncertainty of all others includes theirs.
         sigma_position_m, sigma_orientation_rad: noise per axis, estimated; the latter None for 3D data.
         outlier: ``(N,)`` True for poses left out.
         residual: ``(N, m)`` predicted minus measured, in the measurement frame.
@@ -50,6 +52,7 @@ class Fit:
     names: tuple[poe.ParameterName, ...]
     covariance: Array
     held: dict[int, str]
+    barely_seen: tuple[int, ...]
     sigma_position_m: float
     sigma_orientation_rad: float | None
     outlier: Array
@@ -94,8 +97,7 @@ def calibrate(robot: NominalRobot, measurements: Measurements, effects: Sequence
     held = {int(i): REDUNDANT for i in np.flatnonzero(~free)}
     prior_sigma = np.array([PRIOR_WIDTH * name.prior_scale if name.group == "axis" else np.inf for name in names])
     kinematic = RobustFit(problem, free, prior_sigma)
-    while unseen := kinematic.run():
-        held.update(dict.fromkeys(unseen, NOT_SEEN))
+    kinematic.run()
     found = fit_effects(kinematic, robot, measurements, list(effects))
     return _describe(robot, measurements, problem, names, held, kinematic, found)
 
@@ -129,6 +131,7 @@ def _describe(
         names=names,
         covariance=full,
         held=held,
+        barely_seen=tuple(np.flatnonzero(np.sqrt(np.diag(full)) > np.sqrt(0.5) * kinematic.prior_sigma).tolist()),
         sigma_position_m=float(found.sigma[0]),
         sigma_orientation_rad=float(found.sigma[3]) if measurements.has_orientation else None,
         outlier=~found.inlier,

@@ -92,10 +92,10 @@ def print_calibration(calibration: Calibration) -> None:
     if data.outlier_lines:
         shown = ", ".join(map(str, data.outlier_lines[:12])) + (" ..." if len(data.outlier_lines) > 12 else "")
         warn(f"{len(data.outlier_lines)} outliers left out, lines {shown}")
-    held = [p for p in calibration.parameters if p.status == "held"]
-    for reason in dict.fromkeys(p.reason for p in held):
-        names = ", ".join(p.name for p in held if p.reason == reason)
-        out.print(f"held at nominal ({reason}):\n  {names}")
+    remarkable = [p for p in calibration.parameters if p.reason]
+    for status, reason in dict.fromkeys((p.status, p.reason) for p in remarkable):
+        names = ", ".join(p.name for p in remarkable if p.reason == reason)
+        out.print(f"{'held at nominal, ' if status == 'held' else ''}{reason}:\n  {names}")
 
 
 def print_parameters(calibration: Calibration) -> None:

@@ -17,6 +17,9 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         InputError: the folder does not exist or cannot be written to.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():
+        raise InputError("the output is no file", file=path, expected="a new file or one to replace")
+    path = path.resolve()  # a link stays a link; what it points to is replaced
     data = content.encode("utf-8") if isinstance(content, str) else content
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

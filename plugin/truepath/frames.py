@@ -21,6 +21,7 @@ SETTLED = 1e-7  # m and rad
 STUDENT_DOF = 3.0
 SUBSETS, SUBSET_SIZE = 64, 12
 SUSPICIOUS_MISFIT_M, MAX_MEDIAN_MISFIT_M = 0.005, 0.1
+MAX_MEDIAN_TURN_RAD = 0.2
 WORST_CONDITION = 100.0  # of the equations for the frames; good poses have 10, lengths being in metres
 
 
@@ -59,6 +60,15 @@ def register(
             "placed\n  expected: within 100 mm\n  likely:   radians and degrees or mm and m mixed up, "
             "another robot, joints in another order, or wrong nominal frames"
         )
+    if R_ME is not None:
+        turns = lie.rotation_vector((X_MB @ X_BF @ X_FE)[:, :3, :3] @ np.swapaxes(R_ME, 1, 2))
+        turn = float(np.median(np.linalg.norm(turns, axis=1)))
+        if turn > MAX_MEDIAN_TURN_RAD:
+            raise CalibrationError(
+                f"the measured orientations are {turn:.2f} rad off the nominal robot's in half of the poses\n"
+                f"  expected: within {MAX_MEDIAN_TURN_RAD:g} rad\n  likely:   quaternions in another order than "
+                "qw, qx, qy, qz, or turned the other way (frame to probe instead of probe to frame)"
+            )
     return X_MB, X_FE
 
 

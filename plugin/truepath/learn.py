@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from truepath import calibration_parts as artefact
-from truepath.calibrate import Fit, calibrate
+from truepath.calibrate import BARELY_SEEN, Fit, calibrate
 from truepath.calibration import Calibration
 from truepath.calibration_parts import HeldOutPart
 from truepath.choose import choose_effects
@@ -177,7 +177,7 @@ def describe(
                 sigma=float(fit.sigma[i]),
                 unit=name.unit,
                 status="held" if i in fit.held else "estimated",
-                reason=fit.held.get(i),
+                reason=fit.held.get(i, BARELY_SEEN if i in fit.barely_seen else None),
             )
             for i, name in enumerate(fit.names)
         ],

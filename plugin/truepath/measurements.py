@@ -20,6 +20,7 @@ from truepath.tables import Table
 
 OTHER_UNITS = {"t": "s", "temperature": "c", "payload": "kg"}
 SAME_POSE_RAD = 1e-3
+FARTHEST_M = 1000.0
 LIMIT_TOLERANCE_RAD = np.radians(2.0)
 
 
@@ -133,12 +134,14 @@ def from_table(table: Table, num_joints: int) -> Measurements:
         _reject(table, (names == "")[:, None], ["pose_id"], "the name of a pose is missing", "a name in every row")
         pose_id = np.unique(names, return_inverse=True)[1]
         _require_same_joints(table, q_rad, pose_id)
+    p_ME = table.numbers(p_names) * p_factor
+    _reject(table, np.abs(p_ME) > FARTHEST_M, p_names, "no tracker measures so far", f"within {FARTHEST_M:g} m")
     payload_kg = _optional(table, "payload_kg")
     if payload_kg is not None:
         _reject(table, (payload_kg < 0)[:, None], ["payload_kg"], "a payload cannot be negative", "0 or more")
     return Measurements(
         q_rad=q_rad,
-        p_ME=table.numbers(p_names) * p_factor,
+        p_ME=p_ME,
         R_ME=R_ME,
         time_s=time_s,
         temperature_c=_optional(table, "temperature_c"),

@@ -103,7 +103,7 @@ def stated_probe(robot: NominalRobot, probe: str) -> Array | None:
         offset = np.array([float(part) for part in probe.split(",")])
     except ValueError:
         offset = np.array([math.nan])
-    if offset.shape != (3,) or not np.isfinite(offset).all():
+    if offset.shape != (3,) or not (np.abs(offset) < 1e5).all():
         raise InputError(f"cannot read the place of the probe {probe!r}", expected="unknown, model, or x,y,z in mm")
     return lie.make_pose(translation=offset * 1e-3)
 

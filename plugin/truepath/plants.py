@@ -76,6 +76,8 @@ def add_model(plant: MultibodyPlant, spec: str | Path) -> None:
         added = make_parser(plant).AddModels(str(path))
     except (RuntimeError, ValueError) as error:
         raise InputError("Drake cannot read this model", file=path, found=str(error)) from error
+    if not added or not plant.GetBodyIndices(added[0]):
+        raise InputError("there is no body in this model", file=path)
     if path.suffix == ".urdf":
         base = plant.get_body(plant.GetBodyIndices(added[0])[0])
         children = {int(plant.get_joint(i).child_body().index()) for i in plant.GetJointIndices(added[0])}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from truepath.levenberg_marquardt import CONVERGED_CHI2, Solution, covariance, minimise, noise_components
+from truepath.levenberg_marquardt import CONVERGED_CHI2, Solution, minimise, noise_components
 from truepath.lie import Array
 from truepath.poe_symbolic import PoseProblem
 
@@ -40,8 +40,8 @@ class RobustFit:
         self._known: tuple[Array, Array] | None = None
         self.solution: Solution
 
-    def run(self) -> list[int]:
-        """Fits. Returns the parameters that turned out to be unseen and are free no longer: then run again."""
+    def run(self) -> None:
+        """Fits."""
         for _ in range(ROBUST_ROUNDS):
             # Gross errors must not widen the noise that they are judged by: it comes from the median here.
             before = self.sigma
@@ -51,8 +51,6 @@ class RobustFit:
             self.sigma = np.repeat(medians, 3) / np.sqrt(max(1.0 - spent, 0.1))
             if np.allclose(self.sigma, before, rtol=0.05):
                 break
-        if unseen := self._drop_unseen():
-            return unseen
         inlier = inliers(self.solution.residual, self.sigma)
         for _ in range(MAX_ROUNDS):
             before, sigma_before = inlier, self.sigma
@@ -62,7 +60,6 @@ class RobustFit:
             balanced = np.allclose(self.sigma / self.sigma[0], sigma_before / sigma_before[0], rtol=1e-3)
             if balanced and np.array_equal(inlier, before):
                 break
-        return self._drop_unseen()
 
     def _step(self, inlier: Array | None, tolerance: float = CONVERGED_CHI2) -> None:
         self.solution = minimise(
@@ -84,22 +81,6 @@ class RobustFit:
         p[self.free] = x
         residual, J = self.problem.evaluate(p)
         return residual, J[:, :, self.free]
-
-    def _drop_unseen(self) -> list[int]:
-        """Holds, worst first, every parameter about which the wide prior says more than the data."""
-        index, information = np.flatnonzero(self.free), np.linalg.inv(covariance(self.solution, self.sigma))
-        dropped = []
-        while True:
-            uncertain = np.sqrt(np.diag(np.linalg.inv(information))) / self.prior_sigma[index]
-            worst = int(np.argmax(uncertain))
-            if uncertain[worst] <= np.sqrt(0.5):
-                break
-            dropped.append(int(index[worst]))
-            information = np.delete(np.delete(information, worst, 0), worst, 1)
-            index = np.delete(index, worst)
-        if dropped:
-            self.free[dropped], self.p[dropped], self._known = False, 0.0, None
-        return dropped
 
 
 def _median_noise(residual: Array) -> float:

@@ -105,7 +105,9 @@ def _place_by_axes(urdf: yourdfpy.URDF, robot: NominalRobot, path: Path) -> Arra
     """Pose X_BR ``(4, 4)`` of the URDF's root in the base frame, from where both have the joint axes at zero."""
     children = [urdf.joint_map[name] for name in robot.joint_names]
     X_RJ = np.stack([urdf.get_transform(joint.child) for joint in children])
-    axes = np.stack([X[:3, :3] @ joint.axis for X, joint in zip(X_RJ, children, strict=True)])
+    axes = np.stack(
+        [X[:3, :3] @ (joint.axis / np.linalg.norm(joint.axis)) for X, joint in zip(X_RJ, children, strict=True)]
+    )
     in_urdf = np.concatenate([X_RJ[:, :3, 3], X_RJ[:, :3, 3] + axes])
     in_base = np.concatenate([robot.X_BA[:, :3, 3], robot.X_BA[:, :3, 3] + robot.X_BA[:, :3, 2]])
     centre_R, centre_B = in_urdf.mean(axis=0), in_base.mean(axis=0)
