@@ -132,3 +132,20 @@ def test_a_reader_at_any_moment_sees_one_version_as_a_whole(target):
         reader.join()
     assert seen <= set(versions)
     assert seen
+
+
+def test_a_link_stays_a_link_and_its_target_is_replaced(tmp_path):
+    target, link = tmp_path / "target.txt", tmp_path / "link.txt"
+    target.write_text("old")
+    link.symlink_to(target)
+    write_atomically(link, "new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+def test_a_pipe_is_refused_and_not_replaced(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="the output is no file"):
+        write_atomically(pipe, "new")
+    assert pipe.is_fifo()

@@ -423,3 +423,8 @@ def test_visits_of_one_pose_stay_in_one_fold():
     for k, fold in enumerate(folds):
         for other in folds[k + 1 :]:
             assert not set(data.pose_id[fold]) & set(data.pose_id[other])
+
+
+def test_a_position_that_no_tracker_reaches_is_refused(refusal, sheet):
+    error = refusal(sheet.set("x_mm", 3, "1e300"))
+    assert place(error) == ("no tracker measures so far", 3, "x_mm")

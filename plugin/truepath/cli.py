@@ -135,13 +135,10 @@ def validate(
             "robot or probe were moved since, find the frames again with --refit-frames"
         )
     bounds = (("mean", position.mean, max_mean_mm), ("largest", position.max, max_max_mm))
-    missed = [
-        f"the {name} position error is {value:.4f} mm, more than {bound:g} mm"
-        for name, value, bound in bounds
-        if bound is not None and not value <= bound
-    ]
-    for text in missed:
-        console.complain(f"bound missed: {text}")
+    text = "the {} position error is {:.4f} mm, more than {:g} mm".format
+    missed = [text(name, value, bound) for name, value, bound in bounds if bound is not None and not value <= bound]
+    for reason in missed:
+        console.complain(f"bound missed: {reason}")
     if missed:
         raise typer.Exit(1)
 

@@ -113,6 +113,8 @@ def simulate_campaign(spec: str, seed: int, campaign: Campaign, output: Path, tr
     from truepath.virtual.real_robot import RealRobot
     from truepath.virtual.simulate import free_poses, measure, to_csv, truth_json
 
+    if truth is not None and (truth.resolve() == output.resolve() or not truth.parent.is_dir() or truth.is_dir()):
+        raise InputError("the truth cannot be written here", file=truth, expected="another file in an existing folder")
     real = RealRobot(spec, seed)
     measurements = measure(real, free_poses(real, campaign.poses, np.random.default_rng(campaign.seed)), campaign)
     write_atomically(output, to_csv(measurements))
