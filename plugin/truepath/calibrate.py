@@ -13,7 +13,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from truepath import frames, lie, poe
-from truepath.effect_fit import EffectFit, fit_effects
+from truepath.choose import choose
+from truepath.context import Context
+from truepath.effect_fit import EffectFit
+from truepath.effects import effect_named
 from truepath.errors import CalibrationError
 from truepath.identifiability import independent_columns
 from truepath.lie import Array
@@ -75,14 +78,34 @@ def nominal_frames(robot: NominalRobot, measurements: Measurements) -> tuple[Arr
     return frames.register(X_BF, measurements.p_ME, measurements.R_ME, X_MB=measurements.X_MB_nominal, X_FE=X_FE)
 
 
+@dataclass(frozen=True)
+class KinematicFit:
+    """The kinematics of a robot fitted to a data set, from which fits with effects go on.
+
+    Attributes:
+        robot, measurements: what was fitted to what.
+        fit: the robust fit.
+        context: circumstances of its poses.
+        names: of its parameters.
+        held: number of a parameter to the reason why it stays at nominal.
+    """
+
+    robot: NominalRobot
+    measurements: Measurements
+    context: Context
+    fit: RobustFit
+    names: tuple[poe.ParameterName, ...]
+    held: dict[int, str]
+
+
 @threadpool_limits.wrap(limits=1)  # threads on matrices of this size cost more than they bring
-def calibrate(robot: NominalRobot, measurements: Measurements, effects: Sequence[str] = ()) -> Fit:
-    """Estimates axis deviations, base frame and probe frame, and the sizes of named effects.
+def fit_kinematics(robot: NominalRobot, measurements: Measurements, context: Context | None = None) -> KinematicFit:
+    """Estimates axis deviations, base frame and probe frame.
 
     Args:
         robot: nominal robot.
         measurements: the data.
-        effects: names from ``effects.EFFECTS``; how much of each there is, joint by joint, is learnt.
+        context: circumstances of its poses, if they are part of a larger campaign.
 
     Raises:
         CalibrationError: too few poses, all poses alike, units or robot plainly wrong, no convergence.
@@ -96,24 +119,36 @@ def calibrate(robot: NominalRobot, measurements: Measurements, effects: Sequence
     free = independent_columns(problem.evaluate(no_deviation(robot))[1], _rank(names))
     held = {int(i): REDUNDANT for i in np.flatnonzero(~free)}
     prior_sigma = np.array([PRIOR_WIDTH * name.prior_scale if name.group == "axis" else np.inf for name in names])
-    kinematic = RobustFit(problem, free, prior_sigma)
-    kinematic.run()
-    found = fit_effects(kinematic, robot, measurements, list(effects))
-    return _describe(robot, measurements, problem, names, held, kinematic, found)
+    fit = RobustFit(problem, free, prior_sigma)
+    fit.run()
+    return KinematicFit(robot, measurements, context or Context.of(measurements), fit, names, held)
 
 
-def _describe(
-    robot: NominalRobot,
-    measurements: Measurements,
-    problem: PoseProblem,
-    names: tuple[poe.ParameterName, ...],
-    held: dict[int, str],
-    kinematic: RobustFit,
-    found: EffectFit,
-) -> Fit:
-    n, p, free = robot.num_joints, found.p, kinematic.free
+@threadpool_limits.wrap(limits=1)
+def calibrate(robot: NominalRobot, measurements: Measurements, effects: Sequence[str] = ()) -> Fit:
+    """Estimates axis deviations, base frame and probe frame, and the sizes of named effects.
+
+    Args:
+        robot: nominal robot.
+        measurements: the data.
+        effects: names from ``effects.EFFECTS``; how much of each there is, joint by joint, is learnt, and what the
+            data does not speak for is left out.
+
+    Raises:
+        CalibrationError: too few poses, all poses alike, units or robot plainly wrong, no convergence.
+        InputError: an unknown effect.
+    """
+    names = [effect_named(name).name for name in effects]
+    kinematic = fit_kinematics(robot, measurements)
+    return finish(kinematic, choose(kinematic.fit, kinematic.context, names, nameless=False).fit)
+
+
+def finish(kinematic: KinematicFit, found: EffectFit) -> Fit:
+    """The result of a fit, with its frames put together."""
+    robot, measurements, fit = kinematic.robot, kinematic.measurements, kinematic.fit
+    n, p, problem = robot.num_joints, found.p, fit.problem
     full = np.zeros((len(p), len(p)))
-    full[np.ix_(free, free)] = found.covariance
+    full[np.ix_(fit.free, fit.free)] = found.covariance
     X_MB_nominal, X_FE_nominal = nominal_frames(robot, measurements)
     model = CalibratedModel(
         robot=robot,
@@ -125,18 +160,19 @@ def _describe(
         base_is_given=measurements.X_MB_nominal is not None,
         tool_is_given=measurements.X_FE_nominal is not None,
         effects=found.effects,
+        payload_kg=0.0 if measurements.payload_kg is None else float(np.median(measurements.payload_kg)),
     )
     return Fit(
         model=model,
-        names=names,
+        names=kinematic.names,
         covariance=full,
-        held=held,
-        barely_seen=tuple(np.flatnonzero(np.sqrt(np.diag(full)) > np.sqrt(0.5) * kinematic.prior_sigma).tolist()),
+        held=kinematic.held,
+        barely_seen=tuple(np.flatnonzero(np.sqrt(np.diag(full)) > np.sqrt(0.5) * fit.prior_sigma).tolist()),
         sigma_position_m=float(found.sigma[0]),
         sigma_orientation_rad=float(found.sigma[3]) if measurements.has_orientation else None,
         outlier=~found.inlier,
         residual=found.residual,
-        iterations=kinematic.iterations,
+        iterations=fit.iterations,
         log_evidence=found.log_evidence,
     )
 

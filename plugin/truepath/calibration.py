@@ -59,8 +59,8 @@ class Calibration(Part):
         expected = [(str(name), name.joint, name.unit) for name in parameter_names(n)]
         if [(p.name, p.joint, p.unit) for p in self.parameters] != expected:
             raise ValueError(f"the parameters are not those of a robot with {n} joints")
-        if any(effect.joint > n for effect in self.effects):
-            raise ValueError(f"an effect on a joint beyond the robot's {n}")
+        if not all(effect.fitted().term.fits(n) for effect in self.effects):
+            raise ValueError(f"an effect at a place that a robot with {n} joints does not have")
         shapes = (len(self.region.lower_rad), len(self.region.upper_rad), len(self.region.mean_rad))
         if shapes != (n, n, n) or np.shape(self.region.whitening) != (n, n):
             raise ValueError(f"the region is not that of a robot with {n} joints")
@@ -79,7 +79,15 @@ class Calibration(Part):
             base_is_given=self.base.nominal_source == "given",
             tool_is_given=self.tool.nominal_source == "given",
             effects=tuple(effect.fitted() for effect in self.effects),
+            payload_kg=self.data.payload_kg,
         )
+
+    def carrying(self, payload_kg: float | None) -> Calibration:
+        """For a program with another payload on the flange than there was during the measurements; None: the same."""
+        if payload_kg is None:
+            return self
+        data = self.data.model_copy(update={"payload_kg": payload_kg})
+        return Calibration.model_validate({**dict(self), "schema": SCHEMA, "data": data})
 
     def to_json(self) -> str:
         """Text of the file: indented JSON that ends with a checksum over all that stands before it."""

@@ -141,12 +141,18 @@ class EffectParameterPart(Part):
 
 
 class EffectPart(Part):
-    """A named effect on one joint (counted from 1), within the angles that the data covered."""
+    """A named effect at one place: what it moves, on which joint (from 1) if on one, and what it depends on.
+
+    ``constants`` are no parameters but belong to the formula: ``lower_rad`` and ``upper_rad``, the angles that the
+    data covered and beyond which it fades; a moment, a time constant, a reference temperature; ``default ...``, what
+    is assumed where nobody knows better.
+    """
 
     name: str
-    joint: Annotated[int, Field(ge=1)]
-    lower_rad: Finite
-    upper_rad: Finite
+    moves: str
+    joint: Annotated[int, Field(ge=1)] | None
+    inputs: list[str]
+    constants: dict[str, Finite]
     cause: str
     remedy: str
     parameters: Annotated[list[EffectParameterPart], Field(min_length=1)]
@@ -158,9 +164,10 @@ class EffectPart(Part):
         term, effect = fitted.term, effect_named(fitted.term.effect)
         return cls(
             name=term.effect,
+            moves=term.moves.value,
             joint=term.joint,
-            lower_rad=term.lower_rad,
-            upper_rad=term.upper_rad,
+            inputs=list(term.inputs),
+            constants=dict(term.constants),
             cause=effect.cause,
             remedy=effect.remedy,
             parameters=[
@@ -172,10 +179,13 @@ class EffectPart(Part):
     @model_validator(mode="after")
     def _is_known(self) -> Self:
         from truepath.effects import EFFECTS, is_understood
+        from truepath.motions import Moves
 
         if self.name not in EFFECTS:
             raise ValueError(f"this truepath knows no effect {self.name!r}")
-        if not self.lower_rad < self.upper_rad:
+        if self.moves not in {kind.value for kind in Moves}:
+            raise ValueError(f"nothing called {self.moves!r} can be moved by an effect")
+        if not self.constants.get("lower_rad", -1.0) < self.constants.get("upper_rad", 1.0):
             raise ValueError("lower_rad is not below upper_rad")
         if not is_understood(self.fitted().term):
             raise ValueError(f"effect {self.name!r} has parameters that this truepath does not know")
@@ -183,9 +193,11 @@ class EffectPart(Part):
 
     def fitted(self) -> FittedTerm:
         from truepath.effects.base import EffectParameter, FittedTerm, Term
+        from truepath.motions import Moves
 
         parameters = tuple(EffectParameter(p.name, p.unit, 0.0, "") for p in self.parameters)
-        term = Term(self.name, self.joint, self.lower_rad, self.upper_rad, parameters)
+        constants = tuple(self.constants.items())
+        term = Term(self.name, Moves(self.moves), self.joint, tuple(self.inputs), constants, parameters)
         values, sigma = ([getattr(p, which) for p in self.parameters] for which in ("value", "sigma"))
         return FittedTerm(term, np.array(values), np.array(sigma))
 
@@ -256,10 +268,11 @@ class NoisePart(Part):
 
 
 class DataPart(Part):
-    """Where the calibration comes from. Outliers are line numbers of that file."""
+    """Where the calibration comes from. Outliers are line numbers of that file; the payload is the usual one there."""
 
     file: str
     sha256: str
     poses: Annotated[int, Field(gt=0)]
     has_orientation: bool
+    payload_kg: Annotated[Finite, Field(ge=0)] = 0.0
     outlier_lines: list[int]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from truepath.calibration import Calibration
     from truepath.calibration_parts import AccuracyPart
     from truepath.correct import Correction
+    from truepath.diagnosis import Diagnosis
     from truepath.iso9283 import Accuracy
 
 # Soft wrap: a path or a sentence is one line wherever it goes; terminals break lines by themselves.
@@ -87,8 +88,9 @@ def print_calibration(calibration: Calibration) -> None:
     out.print(f"left unexplained (noise and what the model lacks): {spread}")
     for name in dict.fromkeys(effect.name for effect in calibration.effects):
         found = [effect for effect in calibration.effects if effect.name == name]
-        joints = ", ".join(str(effect.joint) for effect in found)
-        out.print(f"{name} on joint {joints}: {found[0].cause}; {found[0].remedy}")
+        joints = ", ".join(str(effect.joint) for effect in found if effect.joint is not None)
+        place = f" on joint {joints}" if joints else ""
+        out.print(f"{name}{place}: {found[0].cause}; {found[0].remedy}")
     if data.outlier_lines:
         shown = ", ".join(map(str, data.outlier_lines[:12])) + (" ..." if len(data.outlier_lines) > 12 else "")
         warn(f"{len(data.outlier_lines)} outliers left out, lines {shown}")
@@ -96,6 +98,39 @@ def print_calibration(calibration: Calibration) -> None:
     for status, reason in dict.fromkeys((p.status, p.reason) for p in remarkable):
         names = ", ".join(p.name for p in remarkable if p.reason == reason)
         out.print(f"{'held at nominal, ' if status == 'held' else ''}{reason}:\n  {names}")
+
+
+def print_diagnosis(diagnosis: Diagnosis) -> None:
+    """What a person wants to know after a diagnosis; the rest is in the report."""
+    out.print(diagnosis.verdict, style="bold")
+    table = Table(title="error on poses kept away, mm", title_justify="left", box=box.SIMPLE_HEAD)
+    for name, side in (("model", "left"), ("mean", "right"), ("p95", "right"), ("max", "right")):
+        table.add_column(name, justify=side)  # type: ignore[arg-type]
+    for stage in diagnosis.stages:
+        errors = stage.accuracy.position_mm
+        table.add_row(stage.model, f"{errors.mean:.3f}", f"{errors.p95:.3f}", f"{errors.max:.3f}")
+    if diagnosis.stages:
+        out.print(table)
+    for finding in diagnosis.findings:
+        gain = finding.gain
+        low, high = gain.ci95_mm
+        out.print(f"{finding.effect.replace('_', ' ')}: {finding.cause}", style="bold")
+        for line in finding.summary:
+            out.print(f"  {line}")
+        out.print(
+            f"  p {finding.p_value:.1g}; mean error {gain.before_mm:.4f} -> {gain.after_mm:.4f} mm "
+            f"(gain {low:.4f} to {high:.4f} mm)\n  remedy: {finding.remedy}"
+        )
+    for item in diagnosis.ambiguous:
+        warn(f"cannot be told apart: {', '.join(item.effects)}")
+        out.print(f"  {item.why}" + (f"\n  poses that would tell: {item.measure_next}" if item.measure_next else ""))
+    for hint in diagnosis.unexplained.hints:
+        warn(f"not explained: {hint}")
+    for blind in diagnosis.not_testable:
+        out.print(f"not testable: {blind.effect.replace('_', ' ')} ({blind.why})")
+    rows = [str(row) for row in diagnosis.to_dict()["data"]["outliers"]]
+    if rows:
+        warn(f"{len(rows)} rows left out as gross errors: {', '.join(rows[:12])}{' ...' if len(rows) > 12 else ''}")
 
 
 def print_parameters(calibration: Calibration) -> None:

@@ -1,4 +1,4 @@
-"""Fitting named effects on top of the kinematics, all kinematic parameters staying free."""
+"""Fitting terms of named effects on top of the kinematics, all kinematic parameters staying free."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepath.effects import term_bases, terms_of
+from truepath import poe
+from truepath.context import Context
 from truepath.effects.base import FittedTerm, Term
-from truepath.evidence import LinearProblem, Posterior, infer
+from truepath.evidence import LinearProblem, infer
 from truepath.lie import Array
-from truepath.measurements import Measurements
-from truepath.robot import NominalRobot
+from truepath.motions import ChainPoses
+from truepath.poe_symbolic import PoseProblem
 from truepath.robust_fit import NOISE_FLOOR, RobustFit, inliers
+from truepath.term_set import TermSet
 
 MAX_ROUNDS = 8
 SETTLED = 0.05  # of the noise: the largest change of any prediction that is not worth another round
 FRAME_PRIOR = 1.0  # m and rad: no prior at all, but finite
-LEAST_LOG_ODDS_GROUP = 5.0  # for a band of waves or the like to stay
-LEAST_LOG_ODDS_TERM = 10.0  # for a joint to be named
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,12 @@ class EffectFit:
     Attributes:
         p: ``(4 n + 12,)`` kinematic parameters.
         covariance: of the free ones.
-        effects: what was found; joints and waves that the data does not speak for are left out.
+        effects: what was found; terms and groups that the data does not speak for are left out.
         sigma: ``(m,)`` noise of each component.
         inlier: ``(N,)``.
         residual: ``(N, m)``.
+        prior_size: ``(K,)`` learnt prior width of each parameter of the effects.
+        log_odds: of each effect, by name: the model with it against the one without.
         log_evidence: of the inliers.
     """
 
@@ -42,146 +44,108 @@ class EffectFit:
     sigma: Array
     inlier: Array
     residual: Array
+    prior_size: Array
+    log_odds: dict[str, float]
     log_evidence: float
 
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        return tuple(part.term for part in self.effects)
 
-def fit_effects(
-    kinematic: RobustFit, robot: NominalRobot, measurements: Measurements, names: Sequence[str]
-) -> EffectFit:
-    """Continues a kinematic fit with named effects; with none, only adds the evidence."""
+    @property
+    def values(self) -> Array:
+        """``(K,)`` of all terms in a row."""
+        return np.concatenate([part.values for part in self.effects]) if self.effects else np.zeros(0)
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """The readings near a model: y = J_kinematics (p' - p) + A values' + noise.
+
+    Attributes:
+        y: ``(N, m)`` measured less predicted, the effects' own share added again.
+        kinematics: ``(N, m, k)`` derivative by the free kinematic parameters.
+        effects: ``(N, m, K)`` derivative by the parameters of the effects.
+        chain: where everything is, for the columns of other effects.
+    """
+
+    y: Array
+    kinematics: Array
+    effects: Array
+    chain: ChainPoses
+
+
+def linearise(
+    problem: PoseProblem, free: Array, context: Context, terms: TermSet, p: Array, values: Array
+) -> Linearised:
+    """The model with deviations p and effects of those values, and its derivatives."""
+    robot, n = problem.robot, problem.robot.num_joints
+    error = terms.joint_error(values, len(context), n)
+    residual, by_p = problem.evaluate(p, error)
+    X_MB = problem.X_MB @ poe.frame_step(p[poe.base_slice(n)])
+    X_FE = problem.X_FE @ poe.frame_step(p[poe.tool_slice(n)])
+    chain = ChainPoses.of(robot, p, context.q_rad + error, X_MB, X_FE)
+    A = terms.columns(chain, problem.components)
+    # What does not enter through the joints is not in the residual yet; effects are solved for as they are.
+    elsewhere = terms.moves_no_joint()
+    residual = residual + A[:, :, elsewhere] @ values[elsewhere]
+    return Linearised(A @ values - residual, by_p[:, :, free], A, chain)
+
+
+def kinematic_prior(kinematic: RobustFit) -> Array:
+    """``(k,)`` finite prior widths of the free kinematic parameters."""
+    return np.minimum(kinematic.prior_sigma[kinematic.free], FRAME_PRIOR)
+
+
+def fit_effects(kinematic: RobustFit, context: Context, terms: Sequence[Term], *, prune: bool = True) -> EffectFit:
+    """Continues a kinematic fit with terms of effects; with none, only adds the evidence.
+
+    Args:
+        kinematic: the fit to go on from.
+        context: of all its poses.
+        terms: what to fit.
+        prune: drop groups and terms that the data does not speak for.
+    """
     inlier, sigma = kinematic.solution.weights > 0, kinematic.sigma
-    offered = terms_of(names, robot, measurements.q_rad[inlier])
-    waves = _Waves.of(offered, term_bases(robot, measurements.q_rad, offered, measurements.extra_payload_kg))
-    kinematic_prior = np.minimum(kinematic.prior_sigma[kinematic.free], FRAME_PRIOR)
-    k = len(kinematic_prior)
-    p, values, size = kinematic.p.copy(), np.zeros(len(waves)), waves.plausible
+    offered = TermSet.of(kinematic.problem.robot, context, terms)
+    prior = kinematic_prior(kinematic)
+    k = len(prior)
+    p, values, size = kinematic.p.copy(), np.zeros(len(offered)), offered.plausible
     for _ in range(MAX_ROUNDS):
-        residual, by_p, by_angle = kinematic.problem.evaluate_with_angles(
-            p, waves.joint_error(values, robot.num_joints)
-        )
-        A = np.concatenate([by_p[:, :, kinematic.free], waves.columns(by_angle)], axis=2)
-        # Effects are solved for as they are, kinematics as a step from where it stands.
-        y = -residual + A[:, :, k:] @ values
-        problem, kept = LinearProblem.of(A[inlier], y[inlier]), np.arange(len(waves))
+        near = linearise(kinematic.problem, kinematic.free, context, offered, p, values)
+        A = np.concatenate([near.kinematics, near.effects], axis=2)
+        problem = LinearProblem.of(A[inlier], near.y[inlier])
+        kept = np.arange(len(offered))
         while True:
-            group = np.concatenate([np.full(k, -1), waves.group])
-            fixed = np.concatenate([kinematic_prior, np.ones(len(waves))])
-            posterior = infer(problem, group, waves.plausible, fixed, list(sigma[::3]), size)
+            group = np.concatenate([np.full(k, -1), offered.group])
+            fixed = np.concatenate([prior, np.ones(len(offered))])
+            posterior = infer(problem, group, offered.plausible, fixed, list(sigma[::3]), size)
             size = posterior.size
-            speaks = waves.spoken_for(posterior, k)
+            speaks = offered.spoken_for(posterior, k) if prune else np.ones(len(offered), bool)
             if speaks.all():
                 break
-            waves, size = waves.only(speaks), size[np.unique(waves.group[speaks])]
+            offered, size = offered.only(speaks), size[np.unique(offered.group[speaks])]
             kept = kept[speaks]
             problem = problem.only(np.concatenate([np.ones(k, bool), speaks]))
-        step = np.concatenate([posterior.x[:k], -values])
-        step[k + kept] += posterior.x[k:]
+        solution = np.zeros(A.shape[2])
+        solution[:k], solution[k + kept] = posterior.x[:k], posterior.x[k:]
+        residual = A @ solution - near.y
+        solution[k:] -= values
+        moved = A @ solution
         p[kinematic.free] += posterior.x[:k]
         values = posterior.x[k:]
         sigma = np.repeat(np.maximum(posterior.sigma, NOISE_FLOOR), 3)
-        moved = A @ step
-        residual = residual + moved
         before, inlier = inlier, inliers(residual, sigma)
-        if (len(step) == k or np.abs(moved / sigma).max() < SETTLED) and np.array_equal(before, inlier):
+        if (len(solution) == k or np.abs(moved / sigma).max() < SETTLED) and np.array_equal(before, inlier):
             break
     return EffectFit(
         p=p,
         covariance=posterior.covariance[:k, :k],
-        effects=waves.fitted(values, np.sqrt(np.diag(posterior.covariance)[k:])),
+        effects=offered.fitted(values, np.sqrt(np.diag(posterior.covariance)[k:])),
         sigma=sigma,
         inlier=inlier,
         residual=residual,
+        prior_size=posterior.size[offered.group],
+        log_odds={name: offered.log_odds(offered.of_effect(name), posterior, k) for name in offered.effects},
         log_evidence=posterior.log_evidence,
     )
-
-
-@dataclass(frozen=True)
-class _Waves:
-    """All parameters of all terms in a row, whether waves or anything else.
-
-    Attributes:
-        terms: the terms, each with those of its parameters that are still there.
-        term: ``(k,)`` number of the term of each parameter.
-        group: ``(k,)`` number of the group of each.
-        plausible: ``(groups,)`` plausible size of each group.
-        basis: ``(N, k)`` error in rad of the term's joint per unit.
-    """
-
-    terms: tuple[Term, ...]
-    term: Array
-    group: Array
-    plausible: Array
-    basis: Array
-
-    @classmethod
-    def of(cls, terms: Sequence[Term], bases: Sequence[Array]) -> _Waves:
-        labels = [(t, parameter.group) for t, term in enumerate(terms) for parameter in term.parameters]
-        numbers = {label: number for number, label in enumerate(dict.fromkeys(labels))}
-        plausible = {
-            numbers[t, parameter.group]: parameter.prior_scale
-            for t, term in enumerate(terms)
-            for parameter in term.parameters
-        }
-        return cls(
-            tuple(terms),
-            np.array([t for t, _ in labels], int),
-            np.array([numbers[label] for label in labels], int),
-            np.array([plausible[number] for number in range(len(numbers))], float),
-            np.concatenate(bases, axis=1) if bases else np.zeros((0, 0)),
-        )
-
-    def __len__(self) -> int:
-        return len(self.group)
-
-    def joint_error(self, values: Array, num_joints: int) -> Array:
-        """``(N, n)`` rad; a plain zero without any term."""
-        error = np.zeros((len(self.basis), num_joints)) if len(self) else np.zeros((1, num_joints))
-        for t, term in enumerate(self.terms):
-            own = self.term == t
-            error[:, term.joint - 1] += self.basis[:, own] @ values[own]
-        return error
-
-    def columns(self, by_angle: Array) -> Array:
-        """``(N, m, k)`` derivative of the residual, from that by the joint angles ``(N, m, n)``."""
-        if not len(self):
-            return np.zeros((*by_angle.shape[:2], 0))
-        joint = np.array([term.joint - 1 for term in self.terms])[self.term]
-        return by_angle[:, :, joint] * self.basis[:, None, :]
-
-    def spoken_for(self, posterior: Posterior, first: int) -> Array:
-        """``(k,)`` False for the parameters that are the next to go, because the data does not speak for them.
-
-        Groups of one term can stand in for each other, so only the weakest of each term goes at a time; when
-        no group has to go any more, the weakest term.
-        """
-        keep = np.ones(len(self), bool)
-        for t in range(len(self.terms)):
-            groups = np.unique(self.group[self.term == t])
-            odds = [self._log_odds(self.group == group, posterior, first) for group in groups]
-            if min(odds) < LEAST_LOG_ODDS_GROUP:
-                keep[self.group == groups[int(np.argmin(odds))]] = False
-        if keep.all() and self.terms:
-            odds = [self._log_odds(self.term == t, posterior, first) for t in range(len(self.terms))]
-            if min(odds) < LEAST_LOG_ODDS_TERM:
-                keep[self.term == int(np.argmin(odds))] = False
-        return keep
-
-    def _log_odds(self, own: Array, posterior: Posterior, first: int) -> float:
-        groups = self.group[own]
-        return posterior.log_odds(first + np.flatnonzero(own), posterior.size[groups], len(np.unique(groups)))
-
-    def only(self, keep: Array) -> _Waves:
-        """Without the parameters for which ``keep`` ``(k,)`` is False."""
-        terms = []
-        for t, term in enumerate(self.terms):
-            parameters = tuple(p for p, k in zip(term.parameters, keep[self.term == t], strict=True) if k)
-            if parameters:
-                terms.append(Term(term.effect, term.joint, term.lower_rad, term.upper_rad, parameters))
-        groups, group = np.unique(self.group[keep], return_inverse=True)
-        term_of = np.unique(self.term[keep], return_inverse=True)[1]
-        return _Waves(tuple(terms), term_of, group, self.plausible[groups], self.basis[:, keep])
-
-    def fitted(self, values: Array, sigma: Array) -> tuple[FittedTerm, ...]:
-        return tuple(
-            FittedTerm(term, values[self.term == t], sigma[self.term == t]) for t, term in enumerate(self.terms)
-        )

@@ -35,18 +35,21 @@ class LinearProblem:
     H: list[Array]
     g: list[Array]
     yy: list[float]
-    count: list[int]
+    count: list[float]
 
     @classmethod
-    def of(cls, A: Array, y: Array) -> LinearProblem:
-        """From A ``(N, m, k)`` and y ``(N, m)``; m is 3 or 6, three readings of a kind."""
+    def of(cls, A: Array, y: Array, spent: float = 0.0) -> LinearProblem:
+        """From A ``(N, m, k)`` and y ``(N, m)``; m is 3 or 6, three readings of a kind.
+
+        ``spent`` readings of each kind went into parameters that are not in A any more.
+        """
         H, g, yy, count = [], [], [], []
         for first in range(0, y.shape[1], 3):
-            rows, readings = A[:, first : first + 3].reshape(-1, A.shape[2]), y[:, first : first + 3].ravel()
+            rows, readings = A[:, first : first + 3].reshape(3 * len(A), A.shape[2]), y[:, first : first + 3].ravel()
             H.append(rows.T @ rows)
             g.append(rows.T @ readings)
             yy.append(float(readings @ readings))
-            count.append(len(readings))
+            count.append(len(readings) - spent)
         return cls(H, g, yy, count)
 
     def only(self, keep: Array) -> LinearProblem:
@@ -74,7 +77,7 @@ class Posterior:
     sigma: list[float]
     size: Array
     log_evidence: float
-    readings: int
+    readings: float
 
     def log_odds(self, own: Array, size: Array, num_sizes: int) -> float:
         """Log Bayes factor for some parameters against their absence (Savage, Dickey), sizes paid for.
@@ -136,6 +139,8 @@ def infer(
 
 def _solve(problem: LinearProblem, precision: Array, sigma: list[float]) -> tuple[Array, Array, float]:
     """Mean, covariance and log determinant of the posterior precision, in scaled coordinates for stability."""
+    if not len(precision):
+        return np.zeros(0), np.zeros((0, 0)), 0.0
     H = sum((H / s**2 for H, s in zip(problem.H, sigma, strict=True)), np.zeros_like(problem.H[0]))
     g = sum((g / s**2 for g, s in zip(problem.g, sigma, strict=True)), np.zeros_like(problem.g[0]))
     total = np.diag(H) + precision

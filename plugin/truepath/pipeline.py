@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from truepath.lie import Array
 from truepath.programs.toolpath_csv import Toolpath, read_toolpath
 from truepath.robot import NominalRobot
 from truepath.virtual.simulate import Campaign
+
+if TYPE_CHECKING:
+    from truepath.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,32 @@ def correct_toolpath(
         q = joints_along_path(model.robot, toolpath.X_BF, region, line, file)
     correction = correct(model, q, region=region, line=line, file=file, max_correction_mm=max_correction_mm)
     return CorrectedToolpath(toolpath, q, correction, toolpath.with_joints(correction.q_rad))
+
+
+def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path]:
+    """Writes calibration, report, poses to measure next and diagnosis into a folder, which is made if need be.
+
+    Returns:
+        What was written; ``diagnosis.json`` comes last, so that it never names a file that is not there.
+    """
+    from truepath.next_poses import to_csv
+    from truepath.report import write_report
+
+    if folder.exists() and not folder.is_dir():
+        raise InputError("the results need a folder", file=folder, expected="the name of a folder")
+    files = [folder / name for name in ("calibration.json", "report.html")]
+    poses = {folder / item.measure_next: item.poses for item in diagnosis.ambiguous if item.measure_next}
+    files += [*poses, folder / "diagnosis.json"]
+    for file in files:
+        keep(file, data)
+    folder.mkdir(parents=True, exist_ok=True)
+    diagnosis.calibration.save(files[0])
+    write_report(files[1], diagnosis)
+    for file, q_rad in poses.items():
+        assert q_rad is not None
+        write_atomically(file, to_csv(q_rad))
+    diagnosis.save(files[-1])
+    return files
 
 
 def keep(output: Path, *inputs: Path) -> None:

@@ -83,13 +83,29 @@ def calibrated_axes(robot: NominalRobot, p: Array) -> Array:
 
 def flange_poses(robot: NominalRobot, p: Array, phi_rad: Array) -> Array:
     """``(N, 4, 4)`` poses X_BF of the flange in the robot base for true joint angles ``(N, n)``."""
-    return _chain(calibrated_axes(robot, p), robot.X_BF, np.atleast_2d(phi_rad))[0]
+    return axis_and_flange_poses(robot, p, phi_rad)[1]
+
+
+def axis_and_flange_poses(robot: NominalRobot, p: Array, phi_rad: Array) -> tuple[Array, Array]:
+    """Axis frames X_BA ``(N, n, 4, 4)``, each before its own joint turns, and the flange X_BF ``(N, 4, 4)``."""
+    links = link_transforms(calibrated_axes(robot, p), robot.X_BF)
+    phi_rad = np.atleast_2d(phi_rad)
+    cos, sin = np.cos(phi_rad), np.sin(phi_rad)
+    X = np.broadcast_to(np.eye(4), (len(phi_rad), 4, 4))
+    X_BA = np.empty((*phi_rad.shape, 4, 4))
+    for i in range(phi_rad.shape[1]):
+        X = X_BA[:, i] = X @ links[i]
+        # Rotation about the local z: only the first two columns change.
+        c, s = cos[:, i, None], sin[:, i, None]
+        X = np.stack([X[:, :, 0] * c + X[:, :, 1] * s, X[:, :, 1] * c - X[:, :, 0] * s, X[:, :, 2], X[:, :, 3]], axis=2)
+    return X_BA, X @ links[-1]
 
 
 def flange_poses_and_jacobian(robot: NominalRobot, p: Array, phi_rad: Array) -> tuple[Array, Array]:
     """Flange poses ``(N, 4, 4)`` and their Jacobian ``(N, 6, n)``: rotation and velocity of the flange origin, in B."""
-    X_BF, axes, points = _chain(calibrated_axes(robot, p), robot.X_BF, np.atleast_2d(phi_rad))
-    linear = np.cross(axes, X_BF[:, None, :3, 3] - points)
+    X_BA, X_BF = axis_and_flange_poses(robot, p, phi_rad)
+    axes = X_BA[:, :, :3, 2]
+    linear = np.cross(axes, X_BF[:, None, :3, 3] - X_BA[:, :, :3, 3])
     return X_BF, np.concatenate([np.swapaxes(axes, 1, 2), np.swapaxes(linear, 1, 2)], axis=1)
 
 
@@ -97,19 +113,3 @@ def link_transforms(axes_0: Array, X_end: Array) -> Array:
     """``(n + 1, 4, 4)`` poses of each axis frame in the one before it, from base to end, at zero configuration."""
     inverse_0 = lie.invert(axes_0)
     return np.concatenate([axes_0[:1], inverse_0[:-1] @ axes_0[1:], (inverse_0[-1] @ X_end)[None]])
-
-
-def _chain(axes_0: Array, X_end: Array, phi_rad: Array) -> tuple[Array, Array, Array]:
-    """End pose ``(N, 4, 4)``, and direction and a point ``(N, n, 3)`` of each axis where it has moved to."""
-    links = link_transforms(axes_0, X_end)
-    directions, points = [], []
-    cos, sin = np.cos(phi_rad), np.sin(phi_rad)
-    X = np.broadcast_to(np.eye(4), (len(phi_rad), 4, 4))
-    for i in range(len(axes_0)):
-        X = X @ links[i]
-        directions.append(X[:, :3, 2])
-        points.append(X[:, :3, 3])
-        # Rotation about the local z: only the first two columns change.
-        c, s = cos[:, i, None], sin[:, i, None]
-        X = np.stack([X[:, :, 0] * c + X[:, :, 1] * s, X[:, :, 1] * c - X[:, :, 0] * s, X[:, :, 2], X[:, :, 3]], axis=2)
-    return X @ links[-1], np.stack(directions, axis=1), np.stack(points, axis=1)

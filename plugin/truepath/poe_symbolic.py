@@ -32,12 +32,11 @@ def residual_function(num_joints: int, has_orientation: bool) -> ca.Function:
 
     Outputs: residual, predicted minus measured, ``(3)`` in m, or ``(6)`` with a rotation vector in rad
     below, in the measurement frame; its Jacobian with respect to local twists (linear, angular):
-    ``4 n`` columns (vx, vy, wx, wy of each axis), then six of the base at axis 1, six of the probe, and
-    ``n`` for the joint angles.
+    ``4 n`` columns (vx, vy, wx, wy of each axis), then six of the base at axis 1, and six of the probe.
     """
     n = num_joints
     links, phi, position = ca.SX.sym("links", 3, 4 * (n + 1)), ca.SX.sym("phi", n), ca.SX.sym("position", 3)
-    twists = ca.SX.sym("twists", 5 * n + 12)
+    twists = ca.SX.sym("twists", 4 * n + 12)
     inputs = [links, phi, position]
     t = twists[4 * n + 6 : 4 * n + 9]
     R = ca.SX.eye(3) + ca.skew(twists[4 * n + 9 : 4 * n + 12]) if has_orientation else None
@@ -47,7 +46,7 @@ def residual_function(num_joints: int, has_orientation: bool) -> ca.Function:
             vx, vy, wx, wy = (twists[4 * i + k] for k in range(4))
             v, w = ca.vertcat(vx, vy, 0), ca.vertcat(wx, wy, 0)
             R, t = _nudge(R, t, -v, -w)
-            R, t = _turn(R, t, phi[i] + twists[4 * n + 12 + i])
+            R, t = _turn(R, t, phi[i])
             R, t = _nudge(R, t, v, w)
             if i == 0:
                 R, t = _nudge(R, t, twists[4 * n : 4 * n + 3], twists[4 * n + 3 : 4 * n + 6])
@@ -95,12 +94,13 @@ class PoseProblem:
         self._function = BatchedFunction(residual_function(n, measurements.has_orientation), inputs, common=(0,))
         self._q_rad = measurements.q_rad
 
-    def evaluate(self, p: Array) -> tuple[Array, Array]:
-        """Residual ``(N, m)`` and Jacobian ``(N, m, 4 n + 12)``, m = 3 or 6, in m and rad."""
-        return self.evaluate_with_angles(p, np.zeros_like(self._q_rad))[:2]
+    def evaluate(self, p: Array, joint_error_rad: Array | float = 0.0) -> tuple[Array, Array]:
+        """Residual ``(N, m)`` and Jacobian ``(N, m, 4 n + 12)``, m = 3 or 6, in m and rad.
 
-    def evaluate_with_angles(self, p: Array, joint_error_rad: Array) -> tuple[Array, Array, Array]:
-        """The same with joints that stand off by ``(N, n)`` from their commands, and the derivative ``(N, m, n)``."""
+        Args:
+            p: ``(4 n + 12,)`` parameters.
+            joint_error_rad: ``(N, n)`` by how much the joints stand off from their commands.
+        """
         n = self.robot.num_joints
         axes = poe.calibrated_axes(self.robot, p)
         X_BE = self.robot.X_BF @ self.X_FE @ poe.frame_step(p[poe.tool_slice(n)])
@@ -109,9 +109,8 @@ class PoseProblem:
         self._function.inputs[0][:] = links[:, :3].transpose(0, 2, 1).reshape(-1, 3)
         self._function.inputs[1][:] = self._q_rad + joint_error_rad
         residual, local = self._function()
-        local = np.swapaxes(local, 1, 2)
-        by_parameter = local[:, :, : 4 * n + 12] @ _twists_of_parameters(axes, p)
-        return residual[:, 0].copy(), by_parameter, local[:, :, 4 * n + 12 :].copy()
+        by_parameter = np.swapaxes(local, 1, 2) @ _twists_of_parameters(axes, p)
+        return residual[:, 0].copy(), by_parameter
 
 
 def _twists_of_parameters(axes: Array, p: Array) -> Array:

@@ -86,14 +86,24 @@ class NominalRobot:
         Returns:
             ``(N, n)``. Same sign as Drake's ``CalcGravityGeneralizedForces``.
         """
+        R_BA, moment = self._gravity_moment(q_rad, payload_kg, p_FP)
+        return np.einsum("kij,kij->ki", R_BA[..., 2], moment)
+
+    def gravity_moment(self, q_rad: Array, payload_kg: Array | float = 0.0) -> Array:
+        """``(N, n, 3)`` moment of gravity about the origin of each axis frame, in that frame before its joint turns."""
+        R_BA, moment = self._gravity_moment(q_rad, payload_kg, None)
+        return np.einsum("kicj,kic->kij", R_BA, moment)
+
+    def _gravity_moment(self, q_rad: Array, payload_kg: Array | float, p_FP: Array | None) -> tuple[Array, Array]:
+        """Orientation of the axis frames ``(N, n, 3, 3)`` and moment about their origins ``(N, n, 3)``, in B."""
         q_rad = np.atleast_2d(q_rad)
         payload = np.broadcast_to(np.asarray(payload_kg, float), q_rad.shape[:1])
-        omega_0, point_0 = self.X_BA[:, :3, 2], self.X_BA[:, :3, 3]
+        point_0 = self.X_BA[:, :3, 3]
         payload_0 = self.X_BF[:3, 3] if p_FP is None else self.X_BF[:3, :3] @ p_FP + self.X_BF[:3, 3]
         X = np.broadcast_to(np.eye(4), (len(q_rad), 4, 4))
         axes, points, centres = [], [], []
         for i in range(self.num_joints):
-            axes.append(X[:, :3, :3] @ omega_0[i])
+            axes.append(X[:, :3, :3] @ self.X_BA[i, :3, :3])
             points.append(X[:, :3, :3] @ point_0[i] + X[:, :3, 3])
             X = X @ rotation_about_axis(self.X_BA[i], q_rad[:, i])
             centres.append(X[:, :3, :3] @ self.p_BoLcm_B[i] + X[:, :3, 3])
@@ -106,7 +116,7 @@ class NominalRobot:
         mass = np.cumsum(mass[:, ::-1], axis=1)[:, ::-1]
         moment = np.cumsum(moment[:, ::-1], axis=1)[:, ::-1]
         arm = moment - mass[..., None] * np.stack(points, axis=1)
-        return np.einsum("kij,kij->ki", np.stack(axes, axis=1), np.cross(arm, self.gravity_B))
+        return np.stack(axes, axis=1), np.cross(arm, self.gravity_B)
 
 
 def rotation_about_axis(X_BA: Array, angle_rad: Array) -> Array:

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truepath import frames
+from truepath.context import Context
 from truepath.errors import CalibrationError
 from truepath.iso9283 import Accuracy, accuracy
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel, nominal_flange_poses
+from truepath.motions import Moves
 
 SCHEMA = "truepath.validation/1"
 FEWEST_POSES = {3: 4, 6: 3}  # by readings a pose: fewer leave several placements that fit as well
@@ -36,12 +38,12 @@ class Validation:
 
 def validate(model: CalibratedModel, measurements: Measurements) -> Validation:
     """ISO 9283 accuracy before and after calibration; repeated visits of a pose count as one."""
-    groups = measurements.groups()
+    groups, context = measurements.groups(), Context.of(measurements, same_campaign=False)
     nominal, calibrated = (
         accuracy(X_ME, measurements.p_ME, measurements.R_ME, groups)
         for X_ME in (
-            model.predict_nominal(measurements.q_rad),
-            model.predict(measurements.q_rad, measurements.extra_payload_kg),
+            model.predict_nominal(context),
+            model.predict(context),
         )
     )
     return Validation(int(groups.max()) + 1, nominal, calibrated)
@@ -57,7 +59,7 @@ def refit_frames(model: CalibratedModel, measurements: Measurements) -> Calibrat
     """
     p_ME, R_ME = measurements.p_ME, measurements.R_ME
     _require_poses(measurements)
-    X_BF_real = model.flange_poses(measurements.q_rad, measurements.extra_payload_kg)
+    X_BF_real = model.flange_poses(Context.of(measurements, same_campaign=False))
     X_MB, X_FE = frames.register(X_BF_real, p_ME, R_ME)
     frames.require_variety(X_BF_real, X_FE, measurements.has_orientation)
     X_BF = nominal_flange_poses(model.robot, measurements.q_rad)
@@ -70,6 +72,7 @@ def refit_frames(model: CalibratedModel, measurements: Measurements) -> Calibrat
         X_FE_nominal=X_FE_nominal,
         base_is_given=False,
         tool_is_given=False,
+        effects=tuple(part for part in model.effects if part.term.moves not in (Moves.BASE, Moves.PROBE)),
     )
 
 

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pkgutil import iter_modules
 
 import numpy as np
 
-from truepath.effects.base import Effect, FittedTerm, Term, basis, basis_function
+from truepath.context import Context
+from truepath.effects.base import Cause, Effect, FittedTerm, Term, basis, basis_function, probe_columns
 from truepath.errors import InputError
 from truepath.lie import Array
+from truepath.motions import ChainPoses, Moves
 from truepath.robot import NominalRobot
 
-EFFECTS: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
-        import_module(f"{__name__}.{module.name}").EFFECT for module in iter_modules(__path__) if module.name != "base"
+CAUSES: dict[str, Cause] = {
+    cause.name: cause
+    for cause in (
+        import_module(f"{__name__}.{module.name}").EFFECT
+        for module in iter_modules(__path__)
+        if module.name not in ("base", "readings", "steps")
     )
 }
+EFFECTS: dict[str, Effect] = {name: cause for name, cause in CAUSES.items() if isinstance(cause, Effect)}
 
 
 def effect_named(name: str) -> Effect:
@@ -28,41 +33,46 @@ def effect_named(name: str) -> Effect:
     return EFFECTS[name]
 
 
+def effect_of(term: Term) -> Effect:
+    """Whose term it is: a named effect, or one of the forms that a nameless cause can take."""
+    if term.effect in EFFECTS:
+        return EFFECTS[term.effect]
+    from truepath.nameless import NAMELESS
+
+    return NAMELESS[term.effect]
+
+
 def is_understood(term: Term) -> bool:
     """Whether the effect can make sense of a term's parameters, which may come from a file."""
     try:
         basis_function(EFFECTS[term.effect], term)
-    except (ValueError, LookupError, ArithmeticError, RuntimeError, OverflowError):
+    except (ValueError, LookupError, ArithmeticError, RuntimeError, OverflowError, TypeError):
         return False
     return True
 
 
-def terms_of(names: Iterable[str], robot: NominalRobot, q_rad: Array) -> list[Term]:
-    """All terms that poses ``(N, n)`` can resolve of the named effects."""
-    return [term for name in names for term in effect_named(name).terms(robot, q_rad)]
+def motions(robot: NominalRobot, context: Context, fitted: FittedTerm) -> Array:
+    """``(N, c)`` size of a fitted term's motion at each pose."""
+    return basis(EFFECTS[fitted.term.effect], fitted.term, robot, context) @ fitted.values
 
 
-def context_of(robot: NominalRobot, q_rad: Array, terms: Sequence[Term], payload_kg: Array | float) -> dict[str, Array]:
-    """Whatever the terms need to know about poses ``(N, n)``, as ``(N, n)`` arrays by name."""
-    needs = {need for term in terms for need in EFFECTS[term.effect].needs}
-    context = {}
-    if "gravity_torque" in needs:
-        context["gravity_torque"] = robot.gravity_torque(q_rad, payload_kg)
-    return context
-
-
-def term_bases(robot: NominalRobot, q_rad: Array, terms: Sequence[Term], payload_kg: Array | float) -> list[Array]:
-    """For each term ``(N, k)``: error of its joint in rad per unit of each of its parameters."""
-    context = context_of(robot, q_rad, terms, payload_kg)
-    return [basis(EFFECTS[term.effect], term, q_rad, context) for term in terms]
-
-
-def joint_errors(
-    robot: NominalRobot, q_rad: Array, fitted: Sequence[FittedTerm], payload_kg: Array | float = 0.0
-) -> Array:
-    """``(N, n)`` delta_phi of all joints, rad."""
-    errors = np.zeros(q_rad.shape)
-    bases = term_bases(robot, q_rad, [part.term for part in fitted], payload_kg)
-    for part, columns in zip(fitted, bases, strict=True):
-        errors[:, part.term.joint - 1] += columns @ part.values
+def joint_errors(robot: NominalRobot, context: Context, fitted: Sequence[FittedTerm]) -> Array:
+    """``(N, n)`` by how much the joints stand off from their commands, rad."""
+    errors = np.zeros(context.q_rad.shape)
+    for part in fitted:
+        if part.term.moves is Moves.JOINT:
+            assert part.term.joint is not None
+            errors[:, part.term.joint - 1] += motions(robot, context, part)[:, 0]
     return errors
+
+
+def probe_shift(
+    robot: NominalRobot, context: Context, fitted: Sequence[FittedTerm], chain: ChainPoses, kinds: Sequence[Moves]
+) -> Array:
+    """``(N, 6)`` shift and turn of the probe by the terms that move one of ``kinds``, m and rad, in M."""
+    total = np.zeros((len(context), 6))
+    for part in fitted:
+        if part.term.moves in kinds:
+            columns = probe_columns(part.term, basis(EFFECTS[part.term.effect], part.term, robot, context), chain)
+            total += columns @ part.values
+    return total

@@ -1,23 +1,29 @@
-"""What an effect is: a physical cause that turns a joint a little from where its encoder says.
+"""What an effect is: a physical cause that moves something a little, by an amount linear in its parameters.
 
-phi_i = theta_i + sum over effects of delta_phi_i(theta, context), and the parameters enter linearly.
+phi_i = theta_i + sum over effects of delta_phi_i(theta, context); other effects move an axis, the base, the probe
+or stretch lengths: see ``motions.Moves``.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
 from truepath.batched import BatchedFunction
+from truepath.context import Context
+from truepath.effects.readings import OF_A_POSE, is_reading, readings
 from truepath.lie import Array
+from truepath.motions import COMPONENTS, OF_ONE_JOINT, ChainPoses, Moves
 from truepath.robot import NominalRobot
 
 FADE_RAD = np.radians(10.0)
+COLUMNS = {"t_s": "time_s", "temperature_c": "temperature_c"}  # of the data, and where a context has them
 
 
 @dataclass(frozen=True)
@@ -39,20 +45,40 @@ class EffectParameter:
 
 @dataclass(frozen=True)
 class Term:
-    """One effect on one joint (counted from 1), as far as a data set can resolve it.
+    """One effect at one place of the robot, as far as a data set can resolve it.
 
     Attributes:
         effect: name of the effect.
-        joint: number of the joint.
-        lower_rad, upper_rad: angles that the data covered; beyond them the term fades to nothing.
+        moves: what it moves.
+        joint: number of the joint, from 1; None where the whole robot, its base, the probe or the tracker moves.
+        inputs: what the motion depends on, as ``readings.readings`` knows it.
+        constants: names and values of numbers that are no parameters: ``lower_rad`` and ``upper_rad``, the angles
+            that the data covered and beyond which the term fades to nothing; a reference temperature; a moment.
         parameters: what is to be found.
     """
 
     effect: str
-    joint: int
-    lower_rad: float
-    upper_rad: float
+    moves: Moves
+    joint: int | None
+    inputs: tuple[str, ...]
+    constants: tuple[tuple[str, float], ...]
     parameters: tuple[EffectParameter, ...]
+
+    def constant(self, name: str) -> float:
+        """Value of a constant."""
+        return dict(self.constants)[name]
+
+    def with_parameters(self, parameters: tuple[EffectParameter, ...]) -> Term:
+        """The same term with some of its parameters."""
+        return replace(self, parameters=parameters)
+
+    def fits(self, num_joints: int) -> bool:
+        """Whether it makes sense for a robot of so many joints."""
+        if not all(is_reading(name, num_joints) for name in self.inputs):
+            return False
+        if self.joint is None:
+            return self.moves not in OF_ONE_JOINT and not {*self.inputs} & {*OF_A_POSE}
+        return self.moves in OF_ONE_JOINT and 1 <= self.joint <= num_joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,54 +90,100 @@ class FittedTerm:
     sigma: Array = field(default_factory=lambda: np.zeros(0))
 
 
-class Effect(ABC):
-    """A physical cause. One file each; ``effects.EFFECTS`` finds them.
+class Cause:
+    """Why a measured pose is not where the model has it, in plain words.
 
     Attributes:
         name: of the vocabulary in the design document.
-        needs: context that the effect cannot do without, by name: ``gravity_torque``, ...
         cause, remedy: one plain sentence each.
     """
 
     name: str
-    needs: tuple[str, ...] = ()
     cause: str
     remedy: str
 
-    @abstractmethod
-    def terms(self, robot: NominalRobot, q_rad: Array) -> list[Term]:
-        """What poses ``(N, n)`` can resolve of this effect, joint by joint."""
 
-    @abstractmethod
-    def joint_error(self, term: Term, theta: ca.SX, context: Mapping[str, ca.SX], parameters: ca.SX) -> ca.SX:
-        """delta_phi in rad of the term's joint: linear in the parameters ``(k,)``; theta and context are scalars."""
+class Effect(Cause, ABC):
+    """A physical cause with its formula. One file each; ``effects.EFFECTS`` finds them.
 
-
-def basis(effect: Effect, term: Term, q_rad: Array, context: Mapping[str, Array]) -> Array:
-    """``(N, k)`` derivative of the joint's error, rad, with respect to the parameters of a term.
-
-    Args:
-        effect: whose term it is.
-        term: which joint, which parameters.
-        q_rad: ``(N, n)`` commanded joints.
-        context: ``(N, n)`` arrays by name.
+    Attributes:
+        needs: columns of the data that it cannot do without.
+        plausible: its usual size, in words.
+        driver: what makes it change: ``pose``, ``time`` or ``temperature``.
     """
-    joint = term.joint - 1
-    theta = q_rad[:, joint]
-    inputs = [theta, *(context[name][:, joint] for name in effect.needs)]
-    (jacobian,) = BatchedFunction(basis_function(effect, term), inputs)()
-    return jacobian[:, :, 0] * fade(theta, term.lower_rad, term.upper_rad)[:, None]
+
+    needs: ClassVar[tuple[str, ...]] = ()
+    plausible: str
+    driver: ClassVar[str] = "pose"
+
+    @abstractmethod
+    def alternatives(self, robot: NominalRobot, context: Context) -> list[list[Term]]:
+        """What poses can resolve of this effect: a list of forms that exclude each other, each a list of terms.
+
+        An effect that depends on a number which does not enter linearly (a moment, a time constant) offers a form
+        for each of a few values.
+        """
+
+    def refined(self, terms: list[Term], robot: NominalRobot, context: Context) -> list[list[Term]]:
+        """Forms near a good one, to search more finely."""
+        return []
+
+    @abstractmethod
+    def motion(self, term: Term, reading: Mapping[str, ca.SX], parameters: ca.SX) -> ca.SX:
+        """Size ``(c,)`` of the motion's components, linear in the parameters.
+
+        ``reading`` holds a scalar for every input and every constant of the term.
+        """
+
+    def terms(self, robot: NominalRobot, context: Context) -> list[Term]:
+        """Its first form."""
+        forms = self.alternatives(robot, context)
+        return forms[0] if forms else []
+
+    def missing(self, context: Context) -> tuple[str, ...]:
+        """Needed columns that nobody recorded."""
+        return tuple(name for name in self.needs if getattr(context, COLUMNS[name]) is None)
 
 
-@lru_cache(maxsize=256)
+def basis(effect: Effect, term: Term, robot: NominalRobot, context: Context) -> Array:
+    """``(N, c, k)`` derivative of the motion's components with respect to the parameters of a term."""
+    if term.moves is Moves.BASE and any(getattr(context, name, 0) is None for name in term.inputs):
+        return np.zeros((len(context), len(COMPONENTS[term.moves]), len(term.parameters)))  # its mean over the campaign
+    inputs = readings(robot, context, term.inputs, term.joint, dict(term.constants))
+    names = tuple(name for name, _ in term.constants if not name.startswith("default "))
+    values = [np.array([[term.constant(name)]]) for name in names]
+    function = basis_function(effect, replace(term, constants=tuple((name, 0.0) for name in names)))
+    if not inputs:
+        inputs = [np.zeros(len(context))]
+    common = tuple(range(len(inputs), len(inputs) + len(values)))
+    (jacobian,) = BatchedFunction(function, [*inputs, *values], common)()
+    out = np.swapaxes(jacobian, 1, 2).copy()
+    if "lower_rad" in names:
+        assert term.joint is not None
+        theta = context.q_rad[:, term.joint - 1]
+        out *= fade(theta, term.constant("lower_rad"), term.constant("upper_rad"))[:, None, None]
+    return out
+
+
+@lru_cache(maxsize=1024)
 def basis_function(effect: Effect, term: Term) -> ca.Function:
-    """CasADi function (theta, context ...) of one pose: derivative ``(1, k)`` of the error by the parameters."""
-    theta, parameters = ca.SX.sym("theta"), ca.SX.sym("parameters", len(term.parameters))
-    context = {name: ca.SX.sym(name) for name in effect.needs}
-    jacobian = ca.jacobian(effect.joint_error(term, theta, context, parameters), parameters)
+    """CasADi function (inputs ..., constants ...) of one pose: derivative ``(c, k)``; values of constants do not matter."""
+    parameters = ca.SX.sym("parameters", len(term.parameters))
+    inputs = [ca.SX.sym(name) for name in term.inputs]
+    constants = [ca.SX.sym(name) for name, _ in term.constants]
+    reading = dict(zip([*term.inputs, *(name for name, _ in term.constants)], [*inputs, *constants], strict=True))
+    motion = effect.motion(term, reading, parameters)
+    if motion.shape != (len(COMPONENTS[term.moves]), 1):
+        raise TypeError(f"effect {effect.name} does not say how far each of {COMPONENTS[term.moves]} moves")
+    jacobian = ca.jacobian(motion, parameters)
     if ca.depends_on(jacobian, parameters):
         raise TypeError(f"effect {effect.name} is not linear in its parameters")
-    return ca.Function("derivative", [theta, *context.values()], [ca.cse(ca.densify(jacobian))])
+    return ca.Function("derivative", [*(inputs or [ca.SX.sym("none")]), *constants], [ca.cse(ca.densify(jacobian))])
+
+
+def probe_columns(term: Term, motion_basis: Array, chain: ChainPoses) -> Array:
+    """``(N, 6, k)`` shift and turn of the probe per unit of each parameter of a term, for its basis ``(N, c, k)``."""
+    return chain.displacement(term.moves, term.joint) @ motion_basis
 
 
 def fade(theta: Array, lower_rad: float, upper_rad: float) -> Array:
@@ -119,3 +191,9 @@ def fade(theta: Array, lower_rad: float, upper_rad: float) -> Array:
     beyond = np.maximum(lower_rad - theta, theta - upper_rad)
     t = np.clip(1.0 - beyond / FADE_RAD, 0.0, 1.0)
     return t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+
+
+def covered(context: Context, joint: int) -> tuple[tuple[str, float], ...]:
+    """Constants that make a term fade beyond the angles at which its joint (from 1) was measured."""
+    theta = context.q_rad[:, joint - 1]
+    return ("lower_rad", float(theta.min())), ("upper_rad", float(theta.max()))

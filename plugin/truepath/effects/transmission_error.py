@@ -12,8 +12,9 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from truepath.effects.base import Effect, EffectParameter, Term
-from truepath.lie import Array
+from truepath.context import Context
+from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
 HIGHEST_CYCLES_PER_TURN = 128.0
@@ -33,38 +34,38 @@ class TransmissionError(Effect):
     """
 
     name = "transmission_error"
+    plausible = "5 to 500 urad, from one to a hundred cycles per turn"
     cause = "gear, encoder or their mounting is out of round"
     remedy = "keep the correction table of this joint; have the gear looked at if the error is out of the usual"
 
-    def terms(self, robot: NominalRobot, q_rad: Array) -> list[Term]:
+    def alternatives(self, robot: NominalRobot, context: Context) -> list[list[Term]]:
         terms = []
-        for i in range(robot.num_joints):
-            lower, upper = float(q_rad[:, i].min()), float(q_rad[:, i].max())
-            if upper - lower >= LEAST_RANGE_RAD:
-                terms.append(_term(self.name, i + 1, lower, upper, len(np.unique(np.round(q_rad[:, i], 5)))))
-        return terms
+        for joint in range(1, robot.num_joints + 1):
+            theta = context.q_rad[:, joint - 1]
+            if np.ptp(theta) >= LEAST_RANGE_RAD:
+                waves = _waves(float(np.ptp(theta)), len(np.unique(np.round(theta, 5))))
+                terms.append(Term(self.name, Moves.JOINT, joint, ("theta",), covered(context, joint), waves))
+        return [terms]
 
-    def joint_error(self, term: Term, theta: ca.SX, context: Mapping[str, ca.SX], parameters: ca.SX) -> ca.SX:
-        waves = []
+    def motion(self, term: Term, reading: Mapping[str, ca.SX], parameters: ca.SX) -> ca.SX:
+        theta, waves = reading["theta"], []
         for parameter in term.parameters:
             kind, order = parameter.name.split(" ")
             if kind == "half-wave":
-                waves.append(ca.cos(np.pi * int(order) * (theta - term.lower_rad) / (term.upper_rad - term.lower_rad)))
+                share = (theta - reading["lower_rad"]) / (reading["upper_rad"] - reading["lower_rad"])
+                waves.append(ca.cos(np.pi * int(order) * share))
             else:
                 waves.append({"cos": ca.cos, "sin": ca.sin}[kind](int(order) * theta))
         return ca.dot(parameters, ca.vertcat(*waves))
 
 
-def _term(name: str, joint: int, lower: float, upper: float, different_angles: int) -> Term:
-    span = upper - lower
+def _waves(span: float, different_angles: int) -> tuple[EffectParameter, ...]:
     turns = span / (2 * np.pi)
     waves = min(HIGHEST_CYCLES_PER_TURN * turns, different_angles / POSES_PER_WAVE)
     if span >= FULL_TURN_RAD:
         cycles = range(1, int(waves / max(turns, 1.0)) + 1)
-        parameters = [_parameter(f"{kind} {k}", k) for k in cycles for kind in ("cos", "sin")]
-    else:
-        parameters = [_parameter(f"half-wave {m}", 0.5 * m / turns) for m in range(1, int(2 * waves) + 1)]
-    return Term(name, joint, lower, upper, tuple(parameters))
+        return tuple(_parameter(f"{kind} {k}", k) for k in cycles for kind in ("cos", "sin"))
+    return tuple(_parameter(f"half-wave {m}", 0.5 * m / turns) for m in range(1, int(2 * waves) + 1))
 
 
 def _parameter(name: str, cycles_per_turn: float) -> EffectParameter:

@@ -1,0 +1,149 @@
+"""Commands about measured poses: calibrate, diagnose, validate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from truepath.cli_options import (
+    CalibrationFile,
+    DataFile,
+    Format,
+    Json,
+    MeasuredIn,
+    Output,
+    Probe,
+    RobotCheck,
+    RobotSpec,
+    robot_named,
+)
+
+if TYPE_CHECKING:
+    from truepath.measurements import Measurements
+    from truepath.robot import NominalRobot
+
+MOVED = 10.0  # times the error on held-out poses: that is no calibration that aged
+
+
+def calibrate(
+    data: DataFile,
+    output: Output,
+    robot: RobotSpec,
+    format: Format = "csv",
+    measured_in: MeasuredIn = "tracker",
+    probe: Probe = "unknown",
+    effects: Annotated[
+        str, typer.Option(help="auto: those that the data speaks for; none: kinematics only; or names, comma-separated")
+    ] = "auto",
+    parameters: Annotated[bool, typer.Option("--parameters", help="also list every parameter")] = False,
+    json: Json = False,
+) -> None:
+    """Learn the real robot from measured poses and write a calibration file."""
+    from truepath import console
+    from truepath.learn import learn
+    from truepath.pipeline import keep, named_effects, naming
+
+    keep(output, data)
+    with console.progress("calibrating") as say:
+        say("reading the robot")
+        nominal = robot_named(robot)
+        say("reading the data")
+        measurements = _read(data, nominal, format, measured_in, probe)
+        with naming(data):
+            calibration, _ = learn(nominal, measurements, effects=named_effects(effects), source=robot, progress=say)
+        calibration.save(output)
+    if json:
+        content = calibration.model_dump(by_alias=True, include={"robot": {"name", "model_sha256"}})
+        content |= calibration.model_dump(include={"heldout", "noise", "data", "parameters", "effects"})
+        console.print_json({"calibration": str(output), **content})
+        return
+    console.print_calibration(calibration)
+    if parameters:
+        console.print_parameters(calibration)
+    console.out.print(f"written to {output}")
+
+
+def diagnose(
+    data: DataFile,
+    folder: Annotated[Path, typer.Option("--output", "-o", help="folder for the results", show_default=False)],
+    robot: RobotSpec,
+    format: Format = "csv",
+    measured_in: MeasuredIn = "tracker",
+    probe: Probe = "unknown",
+    json: Json = False,
+) -> None:
+    """Show what the simulation gets wrong, name the cause, extend the model, measure the gain."""
+    from truepath import console
+    from truepath.diagnose import diagnose as find_causes
+    from truepath.pipeline import naming, write_diagnosis
+
+    with console.progress("diagnosing") as say:
+        say("reading the robot")
+        nominal = robot_named(robot)
+        say("reading the data")
+        measurements = _read(data, nominal, format, measured_in, probe)
+        with naming(data):
+            diagnosis = find_causes(nominal, measurements, spec=robot, source=robot, progress=say)
+        say("writing the report")
+        files = write_diagnosis(diagnosis, folder, data)
+    if json:
+        console.print_json(diagnosis.to_dict())
+        return
+    console.print_diagnosis(diagnosis)
+    console.out.print("written: " + ", ".join(str(file) for file in files))
+
+
+def validate(
+    data: DataFile,
+    calibration: CalibrationFile,
+    format: Format = "csv",
+    robot: RobotCheck = None,
+    refit_frames: Annotated[
+        Path | None, typer.Option(help="a few other poses: estimate base and probe anew first (the tracker was moved)")
+    ] = None,
+    max_mean_mm: Annotated[float | None, typer.Option(help="exit with 1 if the mean position error is larger")] = None,
+    max_max_mm: Annotated[float | None, typer.Option(help="exit with 1 if any position error is larger")] = None,
+    json: Json = False,
+) -> None:
+    """Measure what a calibration is worth on poses that it has not seen (ISO 9283)."""
+    from truepath import console
+    from truepath import validate as validation
+    from truepath.calibration import load_calibration
+    from truepath.pipeline import naming
+    from truepath.readers import read_measurements
+
+    with console.progress("validating"):
+        loaded = load_calibration(calibration, None if robot is None else robot_named(robot))
+        model = loaded.model
+        measurements = read_measurements(data, model.robot, format)
+        if refit_frames is not None:
+            with naming(refit_frames):
+                model = validation.refit_frames(model, read_measurements(refit_frames, model.robot, format))
+        result = validation.validate(model, measurements)
+    if json:
+        console.print_json(result.to_dict())
+    else:
+        console.print_accuracy(f"{result.poses} poses of {data}", result.nominal, result.calibrated)
+    position = result.calibrated.position_mm
+    if refit_frames is None and loaded.heldout and position.mean > MOVED * loaded.heldout.calibrated.position_mm.mean:
+        console.complain(
+            f"far worse than the {loaded.heldout.calibrated.position_mm.mean:.3f} mm on held-out poses: if tracker, "
+            "robot or probe were moved since, find the frames again with --refit-frames"
+        )
+    bounds = (("mean", position.mean, max_mean_mm), ("largest", position.max, max_max_mm))
+    text = "the {} position error is {:.4f} mm, more than {:g} mm".format
+    missed = [text(name, value, bound) for name, value, bound in bounds if bound is not None and not value <= bound]
+    for reason in missed:
+        console.complain(f"bound missed: {reason}")
+    if missed:
+        raise typer.Exit(1)
+
+
+def _read(data: Path, robot: NominalRobot, format: str, measured_in: str, probe: str) -> Measurements:
+    from truepath.pipeline import stated_base, stated_probe
+    from truepath.readers import read_measurements, with_nominal_frames
+
+    measurements = read_measurements(data, robot, format)
+    return with_nominal_frames(measurements, stated_base(robot, measured_in), stated_probe(robot, probe))

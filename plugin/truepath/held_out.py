@@ -1,0 +1,107 @@
+"""Does a cause predict readings that it was not fitted to? Cross-validation, at random and in blocks of neighbours.
+
+For each part left out the other parts say what the cause does there. If the cause is not real, that prediction has
+nothing to do with what the rest of the model leaves there, and the sum of their products is as often negative as
+positive. Blocks of poses measured one after the other are left out together as well, because what neighbours have
+in common (drift, noise that lasts) would otherwise help to predict them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from truepath.context import Context
+from truepath.effect_fit import EffectFit, kinematic_prior, linearise
+from truepath.lie import Array
+from truepath.robust_fit import RobustFit
+from truepath.term_set import TermSet
+
+FOLDS = 5
+BLOCKS_PER_FOLD = 8
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """A model near which everything is linear, in units of the noise.
+
+    Attributes:
+        y: ``(N, m)`` readings.
+        A: ``(N, m, k)`` columns of kinematics and effects.
+        precision: ``(k,)`` of the priors.
+        place: ``(k,)`` number of the term that a column belongs to, -1 for the kinematics.
+    """
+
+    y: Array
+    A: Array
+    precision: Array
+    place: Array
+
+    @classmethod
+    def of(cls, kinematic: RobustFit, context: Context, fit: EffectFit) -> CrossValidation:
+        """At a fit, for its inliers."""
+        terms = TermSet.of(kinematic.problem.robot, context, fit.terms)
+        near = linearise(kinematic.problem, kinematic.free, context, terms, fit.p, fit.values)
+        A = np.concatenate([near.kinematics, near.effects], axis=2)[fit.inlier] / fit.sigma[:, None]
+        prior = np.concatenate([kinematic_prior(kinematic), fit.prior_size])
+        place = np.concatenate([np.full(near.kinematics.shape[2], -1), terms.term])
+        return cls(near.y[fit.inlier] / fit.sigma, A, prior**-2.0, place)
+
+    def p_values(self, groups: Mapping[str, Array], visits: Array) -> dict[str, float]:
+        """For each set of columns ``(k,)`` True, the larger p value of the two cross-validations.
+
+        Args:
+            groups: the sets, by name.
+            visits: ``(N,)`` number of the pose that a row visits: visits of one pose are left out together.
+        """
+        worst = dict.fromkeys(groups, 0.0)
+        for folds in (_random_folds(visits), _block_folds(len(self.y))):
+            products: dict[str, list[Array]] = {name: [] for name in groups}
+            for rows in folds:
+                for name, product in self._left_out(rows, groups).items():
+                    products[name].append(product)
+            for name, parts in products.items():
+                worst[name] = max(worst[name], _one_sided(np.concatenate(parts)))
+        return worst
+
+    def _left_out(self, rows: Array, groups: Mapping[str, Array]) -> dict[str, Array]:
+        """``(len(rows),)`` by set of columns: its prediction times what is left without it."""
+        k = self.A.shape[2]
+        seen = np.ones(len(self.y), bool)
+        seen[rows] = False
+        A, y = self.A[seen].reshape(-1, k), self.y[seen].ravel()
+        H = A.T @ A + np.diag(self.precision)
+        scale = np.diag(H) ** -0.5
+        covariance = scale[:, None] * np.linalg.inv(scale[:, None] * H * scale) * scale
+        x = covariance @ (A.T @ y)
+        out = {}
+        for name, own in groups.items():
+            # The fit without these columns is the fit under the condition that they are zero.
+            own_covariance = covariance[np.ix_(own, own)]
+            change = covariance[:, own] @ np.linalg.solve(own_covariance, x[own])
+            predicted = self.A[rows] @ change
+            left = self.y[rows] - self.A[rows] @ (x - change)
+            out[name] = np.sum(predicted * left, axis=1)
+        return out
+
+
+def _random_folds(visits: Array) -> list[Array]:
+    order = np.random.default_rng(0).permutation(int(visits.max()) + 1)
+    part = np.empty(len(order), int)
+    part[order] = np.arange(len(order)) % FOLDS
+    return [np.flatnonzero(part[visits] == fold) for fold in range(FOLDS)]
+
+
+def _block_folds(count: int) -> list[Array]:
+    """Every fold takes some short blocks, so that a slow drift can be followed on both sides of each."""
+    block = np.arange(count) * FOLDS * BLOCKS_PER_FOLD // count
+    return [np.flatnonzero(block % FOLDS == fold) for fold in range(FOLDS)]
+
+
+def _one_sided(products: Array) -> float:
+    """Probability that products without a true mean come out so large."""
+    spread = float(np.sqrt(np.sum(products**2)))
+    return float(stats.norm.sf(products.sum() / spread)) if spread > 0 else 1.0

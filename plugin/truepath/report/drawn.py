@@ -1,0 +1,93 @@
+"""What the plots draw: the arrays of a diagnosis in the units of the paper, without the rows left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepath import lie
+from truepath.diagnosis import Diagnosis
+from truepath.lie import Array
+from truepath.report.canvas import AFTER, BEFORE, NOMINAL, PALE
+
+BEFORE_STAGE, AFTER_STAGE = "kinematic", "final"
+COLOURS = {"nominal": NOMINAL, BEFORE_STAGE: BEFORE, AFTER_STAGE: AFTER}
+PALE_COLOURS = {stage: PALE[colour] for stage, colour in COLOURS.items()}
+STAGE_NAMES = {"nominal": "nominal model", BEFORE_STAGE: "kinematic model", AFTER_STAGE: "final model"}
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot in the page: the ``svg`` element, empty where there is nothing to see, and plain text below it."""
+
+    svg: str
+    caption: str
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """K poses, outliers left out, in the order of measurement. B is the robot base.
+
+    Attributes:
+        q_rad: ``(K, n)`` commanded joints.
+        p_BE_mm: ``(K, 3)`` measured positions.
+        unseen: ``(K,)`` True where neither fit nor choice has looked.
+        row: ``(K,)`` number of the pose, from 1.
+        group: ``(K,)`` equal for visits of one pose.
+        time_s, temperature_c: ``(K,)`` or None.
+        error_B: by stage ``(K, 3)`` or ``(K, 6)`` predicted less measured along the axes of B, mm and mrad.
+        joint_view_urad: by stage ``(K, n)``; NaN where a joint says nothing.
+        stages: those of ``kinematic`` and ``final`` that differ: one where nothing was found.
+    """
+
+    q_rad: Array
+    p_BE_mm: Array
+    unseen: Array
+    row: Array
+    group: Array
+    time_s: Array | None
+    temperature_c: Array | None
+    error_B: dict[str, Array]
+    joint_view_urad: dict[str, Array]
+    stages: tuple[str, ...]
+
+    @classmethod
+    def of(cls, diagnosis: Diagnosis) -> Drawn:
+        measurements, kept = diagnosis.measurements, ~np.asarray(diagnosis.outlier, bool)
+        X_BM = lie.invert(diagnosis.calibration.base.estimated.matrix())
+        p_BE = measurements.p_ME @ X_BM[:3, :3].T + X_BM[:3, 3]
+        wanted = (BEFORE_STAGE, AFTER_STAGE) if diagnosis.findings else (BEFORE_STAGE,)
+        return cls(
+            q_rad=measurements.q_rad[kept],
+            p_BE_mm=1e3 * p_BE[kept],
+            unseen=np.asarray(diagnosis.unseen, bool)[kept],
+            row=np.flatnonzero(kept) + 1,
+            group=measurements.groups()[kept],
+            time_s=None if measurements.time_s is None else measurements.time_s[kept],
+            temperature_c=None if measurements.temperature_c is None else measurements.temperature_c[kept],
+            error_B={
+                stage: 1e3 * _turned(X_BM[:3, :3], np.asarray(error))[kept]
+                for stage, error in diagnosis.residuals.items()
+                if stage in COLOURS
+            },
+            joint_view_urad={stage: 1e6 * np.asarray(view)[kept] for stage, view in diagnosis.joint_view.items()},
+            stages=tuple(stage for stage in wanted if stage in diagnosis.residuals),
+        )
+
+    @property
+    def judged(self) -> tuple[Array, str]:
+        """``(K,)`` the poses by which models are judged, and what they are called: all, where none was kept away."""
+        return (self.unseen, "unseen poses") if self.unseen.any() else (np.ones(len(self.row), bool), "poses")
+
+    def error_length(self, stage: str, first: int = 0) -> Array:
+        """``(P,)`` lengths of the errors at unseen poses, visits of one pose averaged; from column ``first`` on."""
+        errors, group = self.error_B[stage][self.unseen, first : first + 3], self.group[self.unseen]
+        group = np.unique(group, return_inverse=True)[1]
+        count = np.bincount(group)[:, None]
+        means = np.stack([np.bincount(group, errors[:, k]) for k in range(3)], axis=1) / count
+        return np.linalg.norm(means, axis=1)
+
+
+def _turned(R: Array, errors: Array) -> Array:
+    return np.concatenate([errors[:, k : k + 3] @ R.T for k in range(0, errors.shape[1], 3)], axis=1)
