@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from truepath import lie
 from truepath.calibrate import Fit, KinematicFit, finish, fit_kinematics
+from truepath.calibration_parts import HeldOutPart
 from truepath.context import Context
 from truepath.describe import describe, held_out
 from truepath.diagnosis import Ambiguity, Diagnosis, Finding, FoundParameter, Gain, Stage, Unexplained
@@ -86,6 +87,7 @@ def diagnose(
     progress(f"fitting all {len(measurements)} poses")
     whole = fit_kinematics(robot, measurements, context)
     fit = finish(whole, fit_effects(whole.fit, context, evidence.named))
+    verification: HeldOutPart | None
     if fit.model.effects:
         how = "a fifth of the poses, drawn at random, kept away from fit and choice of effects"
         accuracies = (trial.accuracy(model) for model in ("nominal", "kinematic", "final"))

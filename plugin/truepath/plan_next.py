@@ -70,7 +70,7 @@ def _later(q_rad: Array, context: Context) -> Context:
     """Poses measured when the campaign goes on, at the last temperature."""
     N = len(q_rad)
     end = float(clock_of(context).max())
-    later = Context(q_rad, context.payload_kg if np.ndim(context.payload_kg) == 0 else None)
+    later = Context(q_rad, None if context.payload_kg is None else float(np.median(context.payload_kg)))
     later = replace(later, **{context.clock: np.full(N, end)})
     if context.temperature_c is not None:
         later = replace(later, temperature_c=np.full(N, context.temperature_c[-1]))

@@ -167,7 +167,7 @@ def basis(effect: Effect, term: Term, robot: NominalRobot, context: Context) -> 
 
 @lru_cache(maxsize=1024)
 def basis_function(effect: Effect, term: Term) -> ca.Function:
-    """CasADi function (inputs ..., constants ...) of one pose: derivative ``(c, k)``; values of constants do not matter."""
+    """CasADi function (inputs ..., constants ...) of one pose: derivative ``(c, k)``."""
     parameters = ca.SX.sym("parameters", len(term.parameters))
     inputs = [ca.SX.sym(name) for name in term.inputs]
     constants = [ca.SX.sym(name) for name, _ in term.constants]
