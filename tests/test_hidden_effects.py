@@ -6,7 +6,7 @@ A quick set; workflows/hidden_effects.py runs hundreds of such cases.
 import numpy as np
 import pytest
 from hidden_effects import EFFECTS, draw_case
-from hidden_effects.scene import Motion, field
+from hidden_effects.scene import Motion, Visible, field
 from hidden_effects.verdict import (
     diagnose_csv,
     finds_the_outliers,
@@ -132,6 +132,13 @@ class TestTheGenerator:
         assert case.unseal().visible_sigmas[effect] == pytest.approx(seen_beside_geometry(case), rel=0.02)
 
     @pytest.mark.parametrize("effect", [effect for effect in EFFECTS if effect != "outlier"])
+    def test_measures_the_cause_that_it_states_and_nothing_else(self, effect):
+        case = draw_case(f"single:{effect}", 2, poses=200, six_d=False, outliers=False)
+        estimate, sigma, chi_square_per_reading = what_an_oracle_finds(case)
+        assert abs(estimate - 1.0) < 4 * sigma + 0.02  # a mixed term of geometry and cause is not linear
+        assert 0.8 < chi_square_per_reading < 1.25
+
+    @pytest.mark.parametrize("effect", [effect for effect in EFFECTS if effect != "outlier"])
     def test_hides_causes_that_are_seen_but_barely(self, effect):
         sigmas = draw_case(f"single:{effect}", 6, poses=POSES).unseal().visible_sigmas[effect]
         assert 0.99 <= sigmas <= 20
@@ -139,6 +146,20 @@ class TestTheGenerator:
     def test_hides_nothing_that_a_small_workspace_would_show(self):
         truth = draw_case("confounded:small_workspace", 2, outliers=False).unseal()
         assert truth.visible_sigmas["joint_compliance"] < 0.2
+
+
+def what_an_oracle_finds(case):
+    """Size of the cause, in sizes of the true one, from the CSV by one who knows its shape; its sigma; chi-square."""
+    robot, campaign, truth = case._robot, case._campaign, case.unseal()
+    table = np.genfromtxt(case.csv.splitlines(), delimiter=",", names=True)
+    measured = 1e-3 * np.stack([table[f"{axis}_mm"] for axis in "xyz"], axis=1)
+    scene = robot.survey(campaign, campaign.time_s[-1])
+    visible = Visible(scene, truth.noise_m, None)
+    rest = visible.part(measured - robot.true_poses(scene, scene.still())[:, :3, 3])
+    shape = visible.part(field(scene, case._motion(scene)))
+    size = shape @ rest / (shape @ shape)
+    readings = len(rest) - 28  # geometry and frames of a UR, measured in 3D, and the size
+    return size, 1 / np.linalg.norm(shape), np.sum((rest - size * shape) ** 2) / readings
 
 
 def seen_beside_geometry(case):

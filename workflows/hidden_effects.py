@@ -186,7 +186,13 @@ def run_case(case: Case) -> Outcome:
     outcome = Outcome(kind, seed)
     start = time.perf_counter()
     try:
-        judge(outcome, hidden("").draw_case(kind, seed))
+        drawn = hidden("").draw_case(kind, seed)
+        try:
+            judge(outcome, drawn)
+        finally:
+            truth = drawn.unseal()
+            parameters = [[*key, value] for key, value in truth.parameters.items()]
+            outcome.truth = {**asdict(truth), "parameters": parameters}
     except Exception:
         outcome.trouble = traceback.format_exc()
     outcome.seconds = time.perf_counter() - start
@@ -199,7 +205,6 @@ def judge(outcome: Outcome, case: Any) -> None:
     diagnosis, verdict = said.diagnose_csv(case.spec, case.csv)
     outcome.verdict = verdict
     truth = case.unseal()
-    outcome.truth = {**asdict(truth), "parameters": [[*key, value] for key, value in truth.parameters.items()]}
     found = said.named(verdict, truth)
     outcome.named_anything = bool(found)
     group = outcome.kind.partition(":")[0]

@@ -24,7 +24,7 @@ from truepath.robust_fit import RobustFit
 from truepath.term_set import TermSet
 
 LEAST_LOG_ODDS = 10.0  # for an effect: odds of 22,000 to 1, decisive by far (Kass, Raftery 1995)
-WORTH_A_LOOK = 0.02  # probability of a group's score by chance, above which it is not even tried
+WORTH_A_LOOK = 0.05  # probability of a group's score by chance, above which it is not even tried
 INVISIBLE = 1e-6  # share of a column's square that must be left when the kinematics is taken out
 NAMED_SHARE = 0.5  # of the evidence for a nameless form
 MOST_ROUNDS = 16

@@ -19,6 +19,7 @@ from truepath.term_set import TermSet
 
 MAX_ROUNDS = 8
 SETTLED = 0.05  # of the noise: the largest change of any prediction that is not worth another round
+NEIGHBOURHOOD = 9  # rows
 FRAME_PRIOR = 1.0  # m and rad: no prior at all, but finite
 
 
@@ -106,7 +107,7 @@ def fit_effects(kinematic: RobustFit, context: Context, terms: Sequence[Term], *
         terms: what to fit.
         prune: drop groups and terms that the data does not speak for.
     """
-    inlier, sigma = kinematic.solution.weights > 0, kinematic.sigma
+    inlier, sigma = _single_rows_apart(kinematic.solution.weights > 0), kinematic.sigma
     offered = TermSet.of(kinematic.problem.robot, context, terms)
     prior = kinematic_prior(kinematic)
     k = len(prior)
@@ -149,3 +150,14 @@ def fit_effects(kinematic: RobustFit, context: Context, terms: Sequence[Term], *
         log_odds={name: offered.log_odds(offered.of_effect(name), posterior, k) for name in offered.effects},
         log_evidence=posterior.log_evidence,
     )
+
+
+def _single_rows_apart(inlier: Array) -> Array:
+    """``(N,)`` where only rows that stand alone stay left out.
+
+    A beam is broken for a row or two. Where most rows of a stretch do not fit, something has moved, and they are
+    what it can be told by.
+    """
+    around = np.convolve(~inlier, np.ones(NEIGHBOURHOOD), mode="same")
+    room = np.convolve(np.ones(len(inlier)), np.ones(NEIGHBOURHOOD), mode="same")
+    return inlier | (around > 0.5 * room)

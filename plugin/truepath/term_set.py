@@ -16,7 +16,7 @@ from truepath.lie import Array
 from truepath.motions import ChainPoses, Moves
 from truepath.robot import NominalRobot
 
-LEAST_LOG_ODDS_GROUP = 4.0  # for a band of waves or the like to stay
+LEAST_LOG_ODDS_GROUP = 1.0  # for a band of waves or the like to stay
 LEAST_LOG_ODDS_TERM = 7.0  # for a joint to be named
 
 

@@ -135,11 +135,6 @@ class Visible:
         columns = [self._whiten(column) for column in _geometry(scene)]
         self._imitations = _span(np.stack(columns, axis=1))
 
-    @property
-    def freedom(self):
-        """How many independent readings are left after geometry and frames."""
-        return self._imitations.shape[0] - self._imitations.shape[1]
-
     def part(self, field, rivals=()):
         """``(3 N or 6 N,)`` whitened rest of a field after geometry, frames and rival fields did their best."""
         rest = self._rest(self._whiten(field))

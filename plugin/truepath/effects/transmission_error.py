@@ -22,7 +22,7 @@ BAND_EDGES = (0.0, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)  # cycles per turn;
 PLAUSIBLE_RAD = 1e-5
 FULL_TURN_RAD = np.radians(330.0)
 LEAST_RANGE_RAD = np.radians(5.0)
-POSES_PER_WAVE = 6  # that a wave must span on average to be told from its neighbours
+POSES_PER_WAVE = 4  # at least: more waves than that and they are not told from each other
 
 
 class TransmissionError(Effect):

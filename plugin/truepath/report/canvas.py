@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from truepath.lie import Array
 
@@ -22,15 +22,15 @@ PALE = {BEFORE: "#efb48a", AFTER: "#6fb0d8", NOMINAL: "#aab2ba"}
 INK, MUTED, GRID = "#1c232b", "#56616d", "#e3e7eb"
 TEXT_SIZE = 10.0
 UNITS_PER_INCH = 72.0  # of the drawing; shown at its natural width, one is a CSS pixel
-RASTER_DPI = 150.0
+RASTER_DPI = 120.0
 MOST_VECTOR_POINTS = 2000
-MOST_DRAWN_POINTS = 6000
+MOST_DRAWN_POINTS = 3000
 
 
 def new_axes(width: float, height: float, *, x_label: str, y_label: str, title: str = "") -> tuple[Figure, Axes]:
     """One plot of so many drawing units. Margins are fixed, so that plots side by side line up."""
     figure = Figure(figsize=(width / UNITS_PER_INCH, height / UNITS_PER_INCH), dpi=UNITS_PER_INCH)
-    left, right, bottom, top = 52.0, 10.0, 38.0, 24.0 if title else 8.0
+    left, right, bottom, top = 52.0, 10.0, 36.0, 24.0 if title else 8.0
     axes = figure.add_axes(
         (left / width, bottom / height, (width - left - right) / width, (height - top - bottom) / height),
         facecolor="none",
@@ -44,15 +44,22 @@ def new_axes(width: float, height: float, *, x_label: str, y_label: str, title: 
     axes.set_xlabel(x_label, color=MUTED, fontsize=TEXT_SIZE)
     axes.set_ylabel(y_label, color=MUTED, fontsize=TEXT_SIZE)
     # Places are stated: to find them, matplotlib would lay out every text twice.
-    axes.xaxis.set_label_coords(0.5, 9.0 / height, transform=figure.transFigure)
+    axes.xaxis.set_label_coords(left / width + 0.5 * (width - left - right) / width, 10.0 / height, transform=figure.transFigure)
     axes.yaxis.set_label_coords(11.0 / width, 0.5 * (bottom + height - top) / height, transform=figure.transFigure)
     axes.yaxis.label.set_verticalalignment("center")
     axes.xaxis.label.set_verticalalignment("center")
     if title:
         axes.set_title(title, color=INK, fontsize=TEXT_SIZE + 1, fontweight="bold", loc="left", pad=7, y=1.0)
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+        axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     return figure, axes
+
+
+def mark_angles(axes: Axes, lowest: float, highest: float) -> None:
+    """Ticks at angles that people know, degrees."""
+    span = highest - lowest
+    step = next((step for step in (1, 2, 5, 10, 15, 30, 45, 60, 90) if span / step <= 8), 180)
+    axes.xaxis.set_major_locator(MultipleLocator(step))
 
 
 def draw_points(axes: Axes, x: Array, y: Array, unseen: Array, colour: str, *, as_picture: bool) -> None:
@@ -129,7 +136,8 @@ def _compact(body: str) -> str:
 
     def rounded(numbers: re.Match[str]) -> str:
         short = re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), numbers[0])
-        return re.sub(r"\s+", " ", short)
+        short = re.sub(r"\s+", " ", short)
+        return re.sub(r"M ([\d.]+ [\d.]+) L \1(?= M|\s?\")", r"M\1h0", short)  # a dot
 
     body = re.sub(r' d="[^"]*"| [xy]="[^"]*"|translate\([^)]*\)', rounded, body)
     return re.sub(r">\s+<", "><", body)

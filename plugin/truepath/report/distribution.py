@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.ticker import LogLocator
 
 from truepath.report.canvas import INK, NOISE, TEXT_SIZE, new_axes, write_svg
-from truepath.report.drawn import COLOURS, STAGE_NAMES, Drawn, Plot
+from truepath.report.drawn import BEFORE_STAGE, COLOURS, STAGE_NAMES, Drawn, Plot
 from truepath.report.words import significant
 
 DASHES = {"nominal": (0, (1, 1)), "kinematic": (0, (5, 2)), "final": "solid"}
@@ -49,13 +49,15 @@ def _plot(drawn: Drawn, stages: list[str], kind: str, unit: str, first: int, flo
     axes.xaxis.set_minor_locator(LogLocator(subs=tuple(range(2, 10)), numticks=40))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(lambda value, _: "")
-    for stage, height in zip(stages, (50, 50, 50), strict=False):
+    for stage in stages:
         middle = float(np.median(drawn.error_length(stage, first)))
+        on_the_right = stage == BEFORE_STAGE  # the others have room on their left
         axes.annotate(
             significant(middle),
-            (middle, height),
-            xytext=(5, -4),
+            (middle, 50),
+            xytext=(6 if on_the_right else -6, -4),
             textcoords="offset points",
+            ha="left" if on_the_right else "right",
             color=INK,
             fontsize=TEXT_SIZE,
             zorder=4,

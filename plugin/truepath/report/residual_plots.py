@@ -14,6 +14,7 @@ from truepath.report.canvas import (
     MOST_VECTOR_POINTS,
     draw_points,
     drawn_rows,
+    mark_angles,
     median_size,
     moving_median,
     new_axes,
@@ -154,6 +155,8 @@ def _scatter(drawn: Drawn, axis: Axis, values: dict[str, Array], frame: Frame, p
         lowest, highest = float(axis.values.min()), float(axis.values.max())
         margin = 0.02 * (highest - lowest) or 0.5
         axes.set_xlim(lowest - margin, highest + margin)
+        if axis.label == ANGLE:
+            mark_angles(axes, lowest, highest)
     rows = drawn_rows(len(axis.values))
     as_picture = len(rows) * len(values) > MOST_VECTOR_POINTS
     beyond = 0
