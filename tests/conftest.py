@@ -4,9 +4,13 @@ import os
 from pathlib import Path
 
 import pytest
+from hidden import Hidden, none
 from hypothesis import settings
 from hypothesis import strategies as st
+from threadpoolctl import threadpool_limits
+from truepath.calibrate import fit_kinematics
 from truepath.plants import load_robot
+from truepath.virtual.real_robot import RealRobot
 
 ROOT = Path(__file__).parents[1]
 
@@ -123,6 +127,31 @@ def data_dir() -> Path:
     if os.environ.get("CI", "").lower() == "true":
         pytest.fail(reason, pytrace=False)
     pytest.skip(reason)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    """Threads on matrices of this size cost more than they bring."""
+    with threadpool_limits(limits=1):
+        yield
+
+
+@pytest.fixture(scope="session")
+def real_ur5():
+    """A UR5 with hidden errors of its geometry."""
+    return RealRobot("ur5", 21)
+
+
+@pytest.fixture(scope="session")
+def clean(real_ur5):
+    """200 poses of it, nothing but geometry being wrong, with everything recorded that there is to record."""
+    return Hidden(real_ur5, none).measured(200, 5, recorded=True)
+
+
+@pytest.fixture(scope="session")
+def clean_kinematic(real_ur5, clean):
+    """The kinematics fitted to these."""
+    return fit_kinematics(real_ur5.robot, clean)
 
 
 INSERTIONS = [b",", b";", b"\n", b"\r", b'"', b"\x00", b"\xff", b"-", b"e", b".", b"_", b"nan", b"9" * 400, b"{", b"]"]

@@ -22,10 +22,25 @@ class Hidden:
     def true_positions(self, q):
         return self.real.reflector_poses(q + self.joint_error(q))[:, :3, 3]
 
-    def measured(self, count, seed):
+    def measured(self, count, seed, *, recorded=False):
+        """Positions with noise; with time, temperature, payload and approach if they are to be recorded."""
         q = self.poses(count, seed)
         noise = np.random.default_rng(seed + 1).normal(scale=self.noise_m, size=(count, 3))
-        return Measurements(q, self.true_positions(q) + noise)
+        circumstances = {}
+        if recorded:
+            rng = np.random.default_rng(seed + 2)
+            circumstances = {
+                "time_s": 12.0 * np.arange(count) + rng.uniform(0, 6, count),
+                "temperature_c": 21.0 + 4.0 * rng.random(count),
+                "payload_kg": rng.choice([0.0, 2.0], count),
+                "approach": rng.choice([-1.0, 1.0], q.shape),
+            }
+        return Measurements(q, self.true_positions(q) + noise, **circumstances)
+
+
+def both(*errors):
+    """Joint errors that add up."""
+    return lambda q: sum(error(q) for error in errors)
 
 
 def wavy(joint, amplitude_rad, cycles, phase=0.4):

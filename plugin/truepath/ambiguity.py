@@ -113,7 +113,7 @@ def _sweep(search: Search, name: str, own: tuple[Term, ...], joint: int) -> Conf
         others = ["warmup_drift"] if own and own[0].moves is Moves.JOINT else []
         others += ["frame_drift"] if joint == 1 or not others else []
     elif effect.driver == "time":
-        stand_in = [waves_of_a_joint(term.moves, term.joint, joint, context) for term in own]
+        stand_in = [waves_of_a_joint(term.moves, term.joint, joint) for term in own]
         others = []
     else:
         return None

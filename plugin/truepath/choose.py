@@ -243,8 +243,8 @@ def _next_best(search: Search, effects: list[Effect], gains: dict[str, float], p
         others = nameless.gain if nameless else -np.inf
         if named and named.gain > max(LEAST_LOG_ODDS, NAMED_SHARE * others):
             return named
-        if nameless and others > LEAST_LOG_ODDS:
-            return nameless
+        if thorough and nameless and others > LEAST_LOG_ODDS:
+            return nameless  # now that no name is left to be given
     return None
 
 

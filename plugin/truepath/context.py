@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from truepath.measurements import Measurements
 
 
-RECORDED = ("time_s", "row", "temperature_c", "approach", "came_by", "p_ME")
+RECORDED = ("time_s", "row", "temperature_c", "approach", "came_by", "p_ME", "R_MF")
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,7 @@ class Context:
         approach: ``(N, n)`` in {-1, 0, 1}, direction from which each joint arrived.
         came_by: ``(N, n)`` in {-1, 0, 1}, where each joint lies against the pose measured just before.
         p_ME: ``(N, 3)`` where the probe was seen, m.
+        R_MF: ``(N, 3, 3)`` how the flange stood, for the tracker.
     """
 
     q_rad: Array
@@ -40,6 +41,7 @@ class Context:
     approach: Array | None = None
     came_by: Array | None = None
     p_ME: Array | None = None
+    R_MF: Array | None = None
 
     @classmethod
     def of(cls, measurements: Measurements, *, same_campaign: bool = True) -> Context:

@@ -73,6 +73,8 @@ def diagnose(
     try:
         looked_at = _some(np.flatnonzero(~unseen), ENOUGH_POSES)
         kinematic = fit_kinematics(robot, measurements.subset(looked_at), context.subset(looked_at))
+        context = replace(context, R_MF=_flange_seen(kinematic, context))
+        kinematic = replace(kinematic, context=context.subset(looked_at))
     except CalibrationError:
         whole = fit_kinematics(robot, measurements, context)  # says what is wrong, or that a fifth less is too little
         return _too_few(whole, source)
@@ -258,6 +260,12 @@ def _ambiguities(
         name = None if poses is None else ("poses.csv" if not found else f"poses{len(found) + 1}.csv")
         found.append(Ambiguity(confusion.effects, confusion.why, poses, name))
     return found
+
+
+def _flange_seen(kinematic: KinematicFit, context: Context) -> Array:
+    """``(N, 3, 3)`` how the flange stands for the tracker, by the kinematics alone."""
+    model = finish(kinematic, fit_effects(kinematic.fit, kinematic.context, ())).model
+    return (model.X_MB @ model.flange_poses(context))[:, :3, :3]
 
 
 def _some(rows: Array, count: int) -> Array:

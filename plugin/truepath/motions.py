@@ -31,6 +31,7 @@ class Moves(str, Enum):
     ROBOT_LENGTHS = "robot lengths"
     MEASURED_LENGTHS = "measured lengths"
     READING = "reading"
+    BEAM = "beam"
 
 
 COMPONENTS: dict[Moves, tuple[str, ...]] = {
@@ -41,11 +42,12 @@ COMPONENTS: dict[Moves, tuple[str, ...]] = {
     Moves.ROBOT_LENGTHS: ("strain",),  # all lengths between base and flange, by a common share
     Moves.MEASURED_LENGTHS: ("strain",),  # all lengths that the tracker reports
     Moves.READING: ("x", "y", "z"),  # of the reported position, in M, m
+    Moves.BEAM: ("distance", "azimuth", "elevation"),  # of the same, m along the beam and rad across
 }
 OF_ONE_JOINT = (Moves.JOINT, Moves.AXIS)
 BEFORE_THE_FLANGE = (Moves.AXIS, Moves.ROBOT_LENGTHS)  # joints apart, which enter the kinematics exactly
 
-AROUND_THE_ROBOT = (Moves.BASE, Moves.PROBE, Moves.MEASURED_LENGTHS, Moves.READING)
+AROUND_THE_ROBOT = (Moves.BASE, Moves.PROBE, Moves.MEASURED_LENGTHS, Moves.READING, Moves.BEAM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +96,21 @@ class ChainPoses:
             return self._twist(X, slice(0, 6))
         if moves is Moves.READING:
             return np.broadcast_to(np.eye(6, 3), (len(self.X_ME), 6, 3))
+        if moves is Moves.BEAM:
+            return self._polar()
         out = np.zeros((len(self.X_ME), 6, 1))
         from_base = self.X_MF[:, :3, 3] - self.X_MB[:3, 3]
         out[:, :3, 0] = from_base if moves is Moves.ROBOT_LENGTHS else self.X_ME[:, :3, 3]
+        return out
+
+    def _polar(self) -> Array:
+        p = self.X_ME[:, :3, 3]
+        out = np.zeros((len(p), 6, 3))
+        level = np.maximum(np.hypot(p[:, 0], p[:, 1]), 1e-9)
+        out[:, :3, 0] = p / np.maximum(np.linalg.norm(p, axis=1, keepdims=True), 1e-9)
+        out[:, 0, 1], out[:, 1, 1] = -p[:, 1], p[:, 0]
+        out[:, :2, 2] = -p[:, :2] * (p[:, 2] / level)[:, None]
+        out[:, 2, 2] = level
         return out
 
     def _twist(self, X_MC: Array, components: slice) -> Array:

@@ -68,7 +68,7 @@ def campaign_at(rng, q, time_s, six_d=None, pose_id=None):
         approach=rng.choice([-1.0, 1.0], (N, n)),
         noise_m=np.exp(rng.uniform(np.log(1e-5), np.log(4e-5))),
         noise_rad=np.exp(rng.uniform(np.log(0.5e-4), np.log(2e-4))) if six_d else None,
-        X_MW=_tracker(rng) if rng.random() < 0.5 else np.eye(4),
+        X_MW=tracker_frame(rng) if rng.random() < 0.5 else np.eye(4),
     )
 
 
@@ -144,8 +144,8 @@ def _weather(rng, progress):
     return rng.uniform(18, 26) + rng.uniform(3, 10) * (curve - curve[0]) / np.ptp(curve)
 
 
-def _tracker(rng):
-    """2 to 4 m away, turned by any angle, level to 0.02 rad."""
+def tracker_frame(rng):
+    """The world X_MW as seen by a tracker 2 to 4 m away, turned by any angle, level to 0.02 rad."""
     X = np.eye(4)
     turn = rotation(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))
     X[:3, :3] = rotation(rng.normal(scale=0.02, size=3)) @ turn

@@ -9,7 +9,7 @@ import numpy as np
 from truepath.virtual.real_robot import Imperfection
 
 from hidden_effects import confounded
-from hidden_effects.campaign import Campaign, add_noise, add_outliers, extended, random_campaign, to_csv
+from hidden_effects.campaign import Campaign, add_noise, add_outliers, extended, random_campaign, to_csv, tracker_frame
 from hidden_effects.cause import Cause, fit_into, visible_rms
 from hidden_effects.library import LIBRARY, backlash, measurement_scale
 from hidden_effects.outside import OUTSIDE, bases_of_library, is_outside
@@ -153,7 +153,8 @@ def _campaign(kind, spec, rng, robot, joint, poses, six_d) -> Campaign:
     if kind == "confounded:sweep":
         return confounded.in_order(rng, spec, robot.real.is_free, joint)
     if kind == "outside":  # what has no name must be seen in the residual as such: that takes more poses
-        return random_campaign(rng, spec, 300, poses, six_d, repeated=0.5)
+        campaign = random_campaign(rng, spec, 300, poses, six_d, repeated=0.5)
+        return replace(campaign, X_MW=tracker_frame(rng))  # some of these causes are the tracker's own
     campaign = random_campaign(rng, spec, count=poses, six_d=six_d)
     if kind == "single:joint_compliance" and rng.random() < 0.25:
         return replace(campaign, payload_kg=rng.choice([0.0, 1.5, 3.0], len(campaign.q)))

@@ -49,7 +49,7 @@ def cyclic_distance(rng):
 
 def breathing_zero(rng):
     """A cabinet's cooling cycles: the zero of a joint swings several times during the campaign."""
-    joint, swings, phase = int(rng.integers(2, 5)), rng.uniform(6, 15), rng.uniform(0, 2 * np.pi)
+    joint, swings, phase = int(rng.integers(2, 4)), rng.uniform(6, 15), rng.uniform(0, 2 * np.pi)
 
     def motion(scene):
         return scene.turning(joint, 1e-4 * np.cos(2 * np.pi * swings * scene.progress - phase))
@@ -59,7 +59,7 @@ def breathing_zero(rng):
 
 def jumping_zero(rng):
     """A loose coupling: a joint's zero jumps back and forth at moments of its own choosing."""
-    joint, jumps = int(rng.integers(2, 5)), np.sort(rng.uniform(0, 1, rng.integers(20, 36)))
+    joint, jumps = int(rng.integers(2, 4)), np.sort(rng.uniform(0, 1, rng.integers(20, 36)))
 
     def motion(scene):
         return scene.turning(joint, 1e-4 * (-1.0) ** np.searchsorted(jumps, scene.progress))
@@ -79,7 +79,7 @@ def sagging_hoses(rng):
 
 def misaligned_reflector(rng):
     """The mirrors of the reflector do not meet in its centre: its reading depends on where the beam comes from."""
-    waves, side = int(rng.integers(3, 6)), direction(rng)
+    waves, side = int(rng.integers(2, 5)), direction(rng)
 
     def motion(scene):
         beam = scene.p_ME / np.linalg.norm(scene.p_ME, axis=1, keepdims=True)

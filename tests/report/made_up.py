@@ -3,19 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
+from by_hand import calibration_by_hand
 from truepath import lie
-from truepath.calibration import Calibration
-from truepath.calibration_parts import (
-    AccuracyPart,
-    DataPart,
-    FramePart,
-    HeldOutPart,
-    NoisePart,
-    Parameter,
-    Pose,
-    RegionPart,
-    RobotPart,
-)
 from truepath.diagnosis import (
     Ambiguity,
     Diagnosis,
@@ -30,7 +19,7 @@ from truepath.iso9283 import accuracy
 from truepath.measurements import Measurements
 from truepath.model import nominal_flange_poses
 from truepath.plants import load_robot
-from truepath.poe import flange_poses_and_jacobian, parameter_names
+from truepath.poe import flange_poses_and_jacobian
 
 NOISE_M = 2.5e-5
 UNKIND = "</script><script>document.title='broken'</script> & <b>\"bold\"</b> $\\frac{ <!-- ü"
@@ -66,7 +55,11 @@ def rich(poses=400, *, six_d=False, name="cell_7_tracker.csv", context=True, lef
     J = _jacobian(robot, measurements.q_rad, X_MB)
     bent = np.einsum("kij,kj->ki", J, turn)[:, :size]
     residuals = {
-        "nominal": bent + noise + drift + rng.normal(scale=2e-3 / np.sqrt(3), size=(1, size)) + 4e-4 * np.sin(3 * noise),
+        "nominal": bent
+        + noise
+        + drift
+        + rng.normal(scale=2e-3 / np.sqrt(3), size=(1, size))
+        + 4e-4 * np.sin(3 * noise),
         "kinematic": turn_only[0] * (bent + drift) + noise,
         "final": turn_only[1] * (bent + drift) + noise,
     }
@@ -223,46 +216,35 @@ def _joint_view(J, residual):
     return np.where(weight > 0.05**2, turn / np.maximum(weight, 1e-12), np.nan)
 
 
-def calibration_by_hand(robot, measurements, X_MB, outlier):
-    """A calibration that nobody fitted."""
-    n = robot.num_joints
-    rng = np.random.default_rng(3)
-    statistics = {"mean": 0.05, "rms": 0.06, "p95": 0.1, "max": 0.2}
-    part = AccuracyPart.model_validate({"position_mm": statistics, "distance_mm": None, "orientation_mrad": None})
-    held = {"axis1.pos_x", "axis1.pos_y", "axis1.rot_x", "axis1.rot_y", "axis2.pos_y", "axis2.rot_y"}
-    return Calibration(
-        created_utc="2025-11-22T08:15:00+00:00",
-        software={"truepath": "0.1.0", "python": "3.11", "numpy": "2.4.6", "drake": "1.51.1"},
-        robot=RobotPart.of(robot, "ur5"),
-        base=FramePart(estimated=Pose.of(X_MB), nominal=Pose.of(X_MB), nominal_source="registered"),
-        tool=FramePart(estimated=Pose.of(np.eye(4)), nominal=Pose.of(np.eye(4)), nominal_source="registered"),
-        parameters=[
-            Parameter(
-                name=str(name),
-                joint=name.joint,
-                value=0.0 if str(name) in held or name.joint is None else rng.normal(scale=4e-4),
-                sigma=0.0 if str(name) in held else 3.3e-6,
-                unit=name.unit,
-                status="held" if str(name) in held else "estimated",
-                reason="the base frame can take its place" if str(name) in held else None,
-            )
-            for name in parameter_names(n)
-        ],
-        effects=[],
-        region=RegionPart(
-            lower_rad=measurements.q_rad.min(axis=0).tolist(),
-            upper_rad=measurements.q_rad.max(axis=0).tolist(),
-            mean_rad=[0.0] * n,
-            whitening=np.eye(n).tolist(),
-            radius=5.0,
-        ),
-        noise=NoisePart(position_mm=0.025, orientation_mrad=None),
-        heldout=HeldOutPart(method="by hand", poses=10, nominal=part, kinematic=None, calibrated=part),
-        data=DataPart(
-            file=measurements.source,
-            sha256=measurements.sha256,
-            poses=len(measurements),
-            has_orientation=measurements.has_orientation,
-            outlier_lines=measurements.line[outlier].tolist(),
-        ),
+def unkind():
+    """Every text that can come from a file or a person tries to break out."""
+    diagnosis = rich(60, name=UNKIND)
+    calibration = diagnosis.calibration
+    robot = calibration.robot.model_copy(update={"name": UNKIND, "joint_names": [UNKIND] * 6})
+    parameters = [
+        p.model_copy(update={"reason": UNKIND if p.status == "held" else None}) for p in calibration.parameters
+    ]
+    calibration = calibration.model_copy(
+        update={"robot": robot, "parameters": parameters, "software": {UNKIND: UNKIND}}
     )
+    finding = diagnosis.findings[0]
+    parameter = replace(finding.parameters[0], name=UNKIND, unit=UNKIND)
+    texts = {"effect": UNKIND, "cause": UNKIND, "remedy": UNKIND, "summary": (UNKIND,), "parameters": (parameter,)}
+    return replace(
+        diagnosis,
+        verdict=UNKIND,
+        calibration=calibration,
+        findings=(replace(finding, **texts),),
+        ambiguous=(Ambiguity((UNKIND, UNKIND), UNKIND, None, "javascript:alert(1)" + UNKIND),),
+        not_testable=(NotTestable(UNKIND, (UNKIND,), UNKIND),),
+        unexplained=replace(diagnosis.unexplained, hints=(UNKIND,), floor_from=UNKIND),
+    )
+
+
+def too_few():
+    """So little data that nothing could be kept away."""
+    diagnosis = rich(20, context=False)
+    nobody = np.zeros(20, bool)
+    unknown = Unexplained(False, 1.0, float("nan"), float("nan"), "neighbours")
+    changes = {"stages": (), "findings": (), "ambiguous": (), "not_testable": (), "residuals": {}, "joint_view": {}}
+    return replace(diagnosis, outlier=nobody, unseen=nobody, unexplained=unknown, **changes)

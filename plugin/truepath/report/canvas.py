@@ -6,6 +6,7 @@ import io
 import re
 from collections.abc import Sequence
 from html import escape
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,12 +26,14 @@ UNITS_PER_INCH = 72.0  # of the drawing; shown at its natural width, one is a CS
 RASTER_DPI = 120.0
 MOST_VECTOR_POINTS = 2000
 MOST_DRAWN_POINTS = 3000
+FEW_VALUES = 40  # of a thermometer that counts in tenths of a degree
+GAP = 0.05  # share of the range that a line does not bridge
 
 
 def new_axes(width: float, height: float, *, x_label: str, y_label: str, title: str = "") -> tuple[Figure, Axes]:
     """One plot of so many drawing units. Margins are fixed, so that plots side by side line up."""
     figure = Figure(figsize=(width / UNITS_PER_INCH, height / UNITS_PER_INCH), dpi=UNITS_PER_INCH)
-    left, right, bottom, top = 52.0, 10.0, 36.0, 24.0 if title else 8.0
+    left, right, bottom, top = 55.0, 10.0, 36.0, 24.0 if title else 8.0
     axes = figure.add_axes(
         (left / width, bottom / height, (width - left - right) / width, (height - top - bottom) / height),
         facecolor="none",
@@ -44,7 +47,9 @@ def new_axes(width: float, height: float, *, x_label: str, y_label: str, title: 
     axes.set_xlabel(x_label, color=MUTED, fontsize=TEXT_SIZE)
     axes.set_ylabel(y_label, color=MUTED, fontsize=TEXT_SIZE)
     # Places are stated: to find them, matplotlib would lay out every text twice.
-    axes.xaxis.set_label_coords(left / width + 0.5 * (width - left - right) / width, 10.0 / height, transform=figure.transFigure)
+    axes.xaxis.set_label_coords(
+        left / width + 0.5 * (width - left - right) / width, 10.0 / height, transform=figure.transFigure
+    )
     axes.yaxis.set_label_coords(11.0 / width, 0.5 * (bottom + height - top) / height, transform=figure.transFigure)
     axes.yaxis.label.set_verticalalignment("center")
     axes.xaxis.label.set_verticalalignment("center")
@@ -68,7 +73,7 @@ def draw_points(axes: Axes, x: Array, y: Array, unseen: Array, colour: str, *, a
     ``as_picture`` embeds it as pixels, which keeps the file small where there are thousands.
     """
     if as_picture:
-        plain = {"linestyle": "none", "rasterized": True, "clip_on": True}
+        plain: dict[str, Any] = {"linestyle": "none", "rasterized": True, "clip_on": True}
         axes.plot(x[~unseen], y[~unseen], marker=".", markersize=3.0, markeredgewidth=0, color=colour, **plain)
         axes.plot(x[unseen], y[unseen], marker="o", markersize=3.2, markeredgewidth=0.7, color=colour, mfc="w", **plain)
         return
@@ -125,7 +130,7 @@ def write_svg(figure: Figure, label: str, identity: str) -> str:
 
 def _own_ids(body: str, identity: str) -> str:
     """Ids are unique in a page, not in a plot; those that nobody refers to go."""
-    used = sorted(set(re.findall(r'(?:url\(#|href="#)([^")]+)', body)))
+    used = dict.fromkeys(re.findall(r'(?:url\(#|href="#)([^")]+)', body))  # matplotlib makes them at random
     names: dict[str, str] = {name: f"{identity}-{k}" for k, name in enumerate(used)}
     body = re.sub(r' id="([^"]+)"', lambda m: f' id="{names[m[1]]}"' if m[1] in names else "", body)
     return re.sub(r'(url\(#|href="#)([^")]+)', lambda m: m[1] + names[m[2]], body)
@@ -150,10 +155,27 @@ def median_size(values: Array, rows: Array) -> float:
 
 
 def moving_median(x: Array, y: Array, most_bins: int) -> tuple[Array, Array]:
-    """Medians of neighbours along x, at least eight a bin. Empty where points are too few to say anything."""
-    count = min(most_bins, len(x) // 8)
-    if count < 6:
+    """Medians of neighbours along x, at least eight of them each, as a line that breaks where x has a gap (NaN).
+
+    Where x takes only a few values, a median for each of these. Empty where points are too few to say anything.
+    """
+    size = max(8, len(x) // most_bins)
+    if len(x) < 6 * size:
         return np.zeros(0), np.zeros(0)
     order = np.argsort(x, kind="stable")
-    parts: Sequence[Array] = np.array_split(order, count)
-    return np.array([x[part].mean() for part in parts]), np.array([np.median(y[part]) for part in parts])
+    x, y = x[order], y[order]
+    distinct = np.unique(x)
+    if len(distinct) <= FEW_VALUES:
+        parts = [rows for rows in (np.flatnonzero(x == value) for value in distinct) if len(rows) >= 8]
+        return _medians(x, y, parts)
+    runs = np.split(np.arange(len(x)), np.flatnonzero(np.diff(x) > GAP * (x[-1] - x[0])) + 1)
+    lines = [_medians(x, y, np.array_split(run, len(run) // size)) for run in runs if len(run) >= size]
+    if not lines:
+        return np.zeros(0), np.zeros(0)
+    broken = [np.append(line, [[np.nan], [np.nan]], axis=1) for line in map(np.array, lines)]
+    joined = np.concatenate(broken, axis=1)[:, :-1]
+    return joined[0], joined[1]
+
+
+def _medians(x: Array, y: Array, parts: Sequence[Array]) -> tuple[Array, Array]:
+    return np.array([np.median(x[rows]) for rows in parts]), np.array([np.median(y[rows]) for rows in parts])

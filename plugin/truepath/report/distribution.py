@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.ticker import LogLocator
 
-from truepath.report.canvas import INK, NOISE, TEXT_SIZE, new_axes, write_svg
-from truepath.report.drawn import BEFORE_STAGE, COLOURS, STAGE_NAMES, Drawn, Plot
+from truepath.report.canvas import NOISE, new_axes, write_svg
+from truepath.report.drawn import COLOURS, STAGE_NAMES, Drawn, Plot
 from truepath.report.words import significant
 
 DASHES = {"nominal": (0, (1, 1)), "kinematic": (0, (5, 2)), "final": "solid"}
@@ -49,18 +49,5 @@ def _plot(drawn: Drawn, stages: list[str], kind: str, unit: str, first: int, flo
     axes.xaxis.set_minor_locator(LogLocator(subs=tuple(range(2, 10)), numticks=40))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(lambda value, _: "")
-    for stage in stages:
-        middle = float(np.median(drawn.error_length(stage, first)))
-        on_the_right = stage == BEFORE_STAGE  # the others have room on their left
-        axes.annotate(
-            significant(middle),
-            (middle, 50),
-            xytext=(6 if on_the_right else -6, -4),
-            textcoords="offset points",
-            ha="left" if on_the_right else "right",
-            color=INK,
-            fontsize=TEXT_SIZE,
-            zorder=4,
-        )
     caption = "Half of the unseen poses are better than: " + ", ".join(said)
     return Plot(write_svg(figure, f"{kind} error on unseen poses. {caption}", f"distribution{first}"), caption)

@@ -35,7 +35,6 @@ def render(diagnosis: Diagnosis) -> str:
         policy=policy,
         css=Markup(_own("page.css")),
         script=Markup(script),
-        joint_names=joint_names,
         verdict=diagnosis.verdict,
         facts=sections.facts(diagnosis),
         subtitle=sections.subtitle(diagnosis),

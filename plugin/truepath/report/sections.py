@@ -27,7 +27,7 @@ from truepath.report.words import (
     with_sign,
 )
 
-CERTAIN_COLUMNS = {"time_s": "t_s"}  # names of fields that differ from those of the columns to record
+COLUMN_OF_FIELD = {"time_s": "t_s"}  # where a field is called otherwise than the column to record
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def not_testable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         {
             "name": effect_name(item.effect),
             "why": _sentence(item.why),
-            "columns": [CERTAIN_COLUMNS.get(column, column) for column in item.columns],
+            "columns": [COLUMN_OF_FIELD.get(column, column) for column in item.columns],
         }
         for item in diagnosis.not_testable
     ]

@@ -83,7 +83,8 @@ def _strip(found: Sequence[tuple[str, ErrorStatistics]], unit: str, floor: float
     for k, ((_, errors), name) in enumerate(zip(found, stage_names([model for model, _ in found]), strict=True)):
         colour = (NOMINAL, BEFORE)[k] if k < 2 else (AFTER if k == last else BETWEEN)
         numbers = (errors.mean, errors.p95, errors.max)
-        bars.append(Bar(name, colour, *(f"{v:.{decimals}f}" for v in numbers), *(place(v) for v in numbers)))
+        mean, p95, most = (f"{number:.{decimals}f}" for number in numbers)
+        bars.append(Bar(name, colour, mean, p95, most, *map(place, numbers)))
     ticks = tuple((f"{tick:g}", place(tick)) for tick in _ticks(lowest, highest))
     return Strip(unit, tuple(bars), ticks, (f"{floor:.{decimals}f}", place(floor)) if floor else None)
 

@@ -87,7 +87,7 @@ def power_of_ten(value: float) -> str:
     mantissa = round(value / 10.0**exponent)
     if abs(mantissa) == 10:
         mantissa, exponent = mantissa // 10, exponent + 1
-    return f"{with_sign(str(mantissa))} × 10{superscript(exponent)}"
+    return f"{with_sign(str(mantissa))} \N{MULTIPLICATION SIGN} 10{superscript(exponent)}"
 
 
 def superscript(number: int) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from truepath.lie import Array
@@ -47,18 +49,22 @@ def _plot(
 ) -> Plot:
     name, across, up = view
     title = f"{STAGE_NAMES[stage].capitalize()}, {name}"
-    labels = {"x_label": f"{'xyz'[across]} of the robot base, mm", "y_label": f"{'xyz'[up]}, mm"}
-    figure, axes = new_axes(*SIZE, title=title, **labels)
+    x_label, y_label = f"{'xyz'[across]} of the robot base, mm", f"{'xyz'[up]}, mm"
+    figure, axes = new_axes(*SIZE, title=title, x_label=x_label, y_label=y_label)
     box = axes.get_position()
     tall = box.height * SIZE[1] / (box.width * SIZE[0])
     axes.set_xlim(centre[across] - half / tall, centre[across] + half / tall)
     axes.set_ylim(centre[up] - half, centre[up] + half)
     axes.plot([0], [0], marker="s", markersize=9, color="#3c4650", markerfacecolor="#c9cdd2", zorder=2)
     axes.annotate("base", (0, 0), (8, -13), textcoords="offset points", fontsize=TEXT_SIZE - 0.5, color=MUTED)
-    arrow = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "units": "dots"}
+    arrow: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "units": "dots"}
     error, p = drawn.error_B[stage], drawn.p_BE_mm
     for rows, width in ((shown[~drawn.unseen[shown]], 1.0), (shown[drawn.unseen[shown]], 1.9)):
-        heads = {"headwidth": 3.2 / width + 1, "headlength": 4.5 / width + 1, "headaxislength": 4.0 / width + 1}
+        heads: dict[str, Any] = {
+            "headwidth": 3.2 / width + 1,
+            "headlength": 4.5 / width + 1,
+            "headaxislength": 4.0 / width + 1,
+        }
         axes.quiver(
             p[rows, across],
             p[rows, up],
@@ -76,7 +82,7 @@ def _plot(
     axes.text(
         start[0] + length * factor,
         start[1] + 0.035 * half,
-        f"error of {significant(length, 1)} mm (× {factor:g})",
+        f"error of {significant(length, 1)} mm (\N{MULTIPLICATION SIGN} {factor:g})",
         ha="right",
         va="bottom",
         fontsize=TEXT_SIZE,
