@@ -1,23 +1,22 @@
-"""Named effects: found on the joints that have them, nowhere else, and worth what is claimed."""
+"""Effects that are asked for: found on the joints that have them, nowhere else, and worth what is claimed."""
 
 import numpy as np
 import pytest
 from hidden import Hidden, none, soft, wavy
 from scipy.spatial.transform import Rotation
 from truepath.calibrate import calibrate
-from truepath.choose import choose_effects
+from truepath.context import Context
 from truepath.correct import correct
 from truepath.effects import EFFECTS, joint_errors
 from truepath.errors import CorrectionError
 from truepath.learn import learn
 from truepath.measurements import Measurements
 from truepath.model import nominal_flange_poses
-from truepath.virtual.real_robot import RealRobot
 
 
 @pytest.fixture(scope="module")
-def real():
-    return RealRobot("ur5", 21)
+def real(real_ur5):
+    return real_ur5
 
 
 def named(fit_or_calibration):
@@ -37,7 +36,7 @@ def test_a_wave_of_tens_of_cycles_is_found_on_its_joint_alone(real):
     fit = calibrate(real.robot, hidden.measured(400, 2), ["transmission_error"])
     assert named(fit) == {("transmission_error", 3)}
     q = hidden.poses(300, 99)
-    found, truth = joint_errors(real.robot, q, fit.model.effects)[:, 2], hidden.joint_error(q)[:, 2]
+    found, truth = joint_errors(real.robot, Context(q), fit.model.effects)[:, 2], hidden.joint_error(q)[:, 2]
     assert np.std(found - truth) < 0.2 * np.std(truth)
 
 
@@ -63,13 +62,16 @@ def test_a_soft_joint_is_found_with_its_compliance(real):
 @pytest.mark.parametrize("seed", [5, 6, 7])
 def test_nothing_is_named_where_nothing_is_hidden(real, seed):
     data = Hidden(real, none).measured(200, seed)
-    assert choose_effects(real.robot, data) == ()
     assert named(calibrate(real.robot, data, list(EFFECTS))) == set()
 
 
 def test_the_cause_is_told_from_one_that_looks_alike(real):
-    assert choose_effects(real.robot, Hidden(real, soft(real, 2, 1.2e-5)).measured(300, 8)) == ("joint_compliance",)
-    assert choose_effects(real.robot, Hidden(real, wavy(5, 3e-4, 4)).measured(300, 9)) == ("transmission_error",)
+    both = ["joint_compliance", "transmission_error", "backlash", "encoder_scale"]
+    soft_joint, uneven_gear = soft(real, 2, 1.2e-5), wavy(5, 3e-4, 4)
+    fit = calibrate(real.robot, Hidden(real, soft_joint).measured(300, 8), both)
+    assert named(fit) == {("joint_compliance", 2)}
+    fit = calibrate(real.robot, Hidden(real, uneven_gear).measured(300, 9), both)
+    assert named(fit) == {("transmission_error", 5)}
 
 
 def test_the_gain_stated_on_held_out_poses_is_the_gain_on_fresh_ones(real):

@@ -90,7 +90,7 @@ def _hats(poses, count):
 def test_visits_of_one_pose_are_left_out_together():
     """Every pose has an error of its own, the same at every visit, and the effect a column for every pose."""
     rng = np.random.default_rng(5)
-    visits = np.tile(np.arange(25), 8)
+    visits = rng.permutation(np.tile(np.arange(25), 8))
     own_error = rng.normal(scale=5.0, size=(25, 3))
     y = own_error[visits] + rng.normal(size=(POSES, 3))
     poses = np.eye(25)[visits]

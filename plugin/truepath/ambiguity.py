@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepath.calibrate import KinematicFit
-from truepath.choose import LEAST_LOG_ODDS, Search
+from truepath.contest import LEAST_LOG_ODDS
 from truepath.effect_fit import fit_effects
 from truepath.effects import EFFECTS
 from truepath.effects.base import Term
@@ -17,6 +17,7 @@ from truepath.marginal import Marginal
 from truepath.motions import Moves
 from truepath.nameless import in_time, waves_of_a_joint
 from truepath.poe import ParameterName
+from truepath.search import Search
 from truepath.term_set import TermSet
 
 SWEPT = 0.9  # share of the clock's variance that one joint's angle explains

@@ -9,12 +9,13 @@ import numpy as np
 
 from truepath.ambiguity import Confusion, common_length, confusions_of_findings, hidden_behind_geometry
 from truepath.calibrate import KinematicFit
-from truepath.choose import Search, choose
+from truepath.choose import choose
 from truepath.effect_fit import EffectFit, fit_effects
 from truepath.effects import EFFECTS
 from truepath.effects.base import Term
 from truepath.held_out import CrossValidation
 from truepath.lie import Array
+from truepath.search import Search
 
 SIGNIFICANT = 0.01  # p value of a finding, all hypotheses that were tried taken into account
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from truepath.ambiguity import Confusion
 from truepath.calibrate import KinematicFit
-from truepath.choose import Search
 from truepath.context import Context
 from truepath.effect_fit import EffectFit, linearise
 from truepath.effects.steps import clock_of
@@ -18,6 +17,7 @@ from truepath.measurements import Measurements
 from truepath.motions import ChainPoses
 from truepath.next_poses import candidates, most_telling
 from truepath.poe_symbolic import PoseProblem
+from truepath.search import Search
 from truepath.term_set import TermSet
 
 FULL_CIRCLE = np.pi

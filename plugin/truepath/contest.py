@@ -1,0 +1,120 @@
+"""The contest of causes: names first, forms without a name for the rest, and a look back at doubtful names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truepath.effect_fit import fit_effects
+from truepath.effects import EFFECTS
+from truepath.effects.base import Effect, Term
+from truepath.search import Search, Trial
+
+LEAST_LOG_ODDS = 10.0  # for an effect: odds of 22,000 to 1, decisive by far (Kass, Raftery 1995)
+NAMED_SHARE = 0.5  # of the evidence for a nameless form that a named effect must reach to be above suspicion
+JOINT_SHARE = 0.8  # of it that all suspects together must reach
+MOST_ROUNDS = 16
+
+Progress = Callable[[str], None]
+
+
+@dataclass
+class Contest:
+    """Takes effects one after the other, the one with the most evidence first, while they raise it decisively.
+
+    No formula of a real cause is perfect, and a form with many parameters can always make up for the rest: so a
+    named effect comes before any nameless form. But what explains less than half as much as a nameless form does is
+    under suspicion of being its shadow.
+
+    Attributes:
+        search: the model so far.
+        named, nameless: who takes part.
+        progress: told what is being tried.
+        suspects: names of effects under suspicion.
+        gains: what each brought the last time it was tried. That hardly ever rises when another comes in, so
+            those that brought little are tried again only when nothing else passes.
+    """
+
+    search: Search
+    named: Sequence[Effect]
+    nameless: Sequence[Effect]
+    progress: Progress
+    suspects: set[str] = field(default_factory=set)
+    gains: dict[str, float] = field(default_factory=dict)
+    _fruitless: set[str] = field(default_factory=set)
+
+    def run(self) -> None:
+        """Until nothing more passes."""
+        for _ in range(MOST_ROUNDS):
+            fresh: dict[str, Trial] = {}
+            best = self._best_of(self.named, fresh, LEAST_LOG_ODDS) or self._best_of(self.named, fresh, -np.inf)
+            if best is not None:
+                rival = self._best_of(self.nameless, fresh, best.gain / NAMED_SHARE)
+                if rival is not None:
+                    self.suspects.add(best.name)
+            else:
+                best = self._best_of(self.nameless, fresh, LEAST_LOG_ODDS)
+                best = best or self._best_of(self.nameless, fresh, -np.inf)
+            if best is None:
+                return
+            self._take(best)
+
+    def examine(self) -> bool:
+        """Drops all suspects if a single nameless form explains more than they do together; True if so."""
+        terms = self.search.fit.terms
+        suspects = tuple(term for term in terms if term.effect in self.suspects)
+        if not suspects:
+            return False
+        before = self.search.fit
+        self._fit([term for term in terms if term.effect in EFFECTS and term.effect not in self.suspects])
+        together = self.search.gain_of(suspects)
+        rival = self._best_of(self.nameless, {}, -np.inf)
+        if rival is None or together > JOINT_SHARE * rival.gain:
+            self.search.fit = before
+            self.search.look()
+            return False
+        self._take(rival)
+        self.gains.clear()
+        return True
+
+    def _best_of(self, effects: Iterable[Effect], fresh: dict[str, Trial], promise: float) -> Trial | None:
+        """The best of those that brought more than ``promise`` the last time, if it passes."""
+        able = {effect.name: effect for effect in effects if effect.name not in self._fruitless}
+        while stale := {name for name in able if name not in fresh}:
+            name = max(stale, key=lambda name: self.gains.get(name, np.inf))
+            top = max((trial.gain for trial in fresh.values() if trial.name in able), default=-np.inf)
+            if self.gains.get(name, np.inf) < max(top, promise):
+                break
+            self.progress(f"is there {name.replace('_', ' ')}?")
+            fresh[name] = self.search.trial(able[name])
+            self.gains[name] = fresh[name].gain
+        best = max((fresh[name] for name in able if name in fresh), key=lambda trial: trial.gain, default=None)
+        return best if best is not None and best.gain > max(LEAST_LOG_ODDS, promise) else None
+
+    def _take(self, trial: Trial) -> None:
+        before = self.search.fit
+        self._fit(merged(before.terms, trial.terms))
+        if not set(_places(self.search.fit.terms)) - set(_places(before.terms)):
+            self._fruitless.add(trial.name)  # it came and went: no use in trying it again and again
+
+    def _fit(self, terms: Iterable[Term]) -> None:
+        self.search.fit = fit_effects(self.search.kinematic, self.search.context, tuple(terms))
+        self.search.look()
+
+
+def _places(terms: Iterable[Term]) -> list[tuple]:
+    """What is in a model: every parameter of every effect at every place."""
+    return [(t.effect, t.moves, t.joint, t.constants, p.name) for t in terms for p in t.parameters]
+
+
+def merged(old: Iterable[Term], new: Iterable[Term]) -> tuple[Term, ...]:
+    """All terms; parameters of the same effect at the same place come together."""
+    by_place: dict[tuple, Term] = {}
+    for term in (*old, *new):
+        place = (term.effect, term.moves, term.joint, term.inputs, term.constants)
+        if place in by_place:
+            term = term.with_parameters(by_place[place].parameters + term.parameters)
+        by_place[place] = term
+    return tuple(by_place.values())

@@ -1,0 +1,159 @@
+"""A model under construction: what another effect would add to it.
+
+The kinematics, and what is in the model already, is integrated out (``marginal``); an effect is judged by the rise
+of the marginal likelihood, its sizes being learnt from the data (``evidence``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import stats
+
+from truepath.context import Context
+from truepath.effect_fit import EffectFit, kinematic_prior, linearise
+from truepath.effects.base import Effect, Term
+from truepath.evidence import LinearProblem, Posterior, infer
+from truepath.lie import Array
+from truepath.marginal import Marginal
+from truepath.robust_fit import RobustFit
+from truepath.term_set import TermSet
+
+WORTH_A_LOOK = 0.05  # probability of a group's score by chance, above which it is not even tried
+INVISIBLE = 1e-6  # share of a column's square that must be left when the kinematics is taken out
+
+
+@dataclass(frozen=True)
+class Trial:
+    """By how much the log evidence rises with an effect, and those terms of it that are spoken for."""
+
+    name: str
+    gain: float = -np.inf
+    terms: tuple[Term, ...] = ()
+
+
+@dataclass
+class Search:
+    """The state of a search: a model, the readings near it, the terms in it.
+
+    Attributes:
+        kinematic: fit of the kinematics alone.
+        context: of all its poses.
+        fit: the present model.
+        tried: hypotheses so far, by effect.
+    """
+
+    kinematic: RobustFit
+    context: Context
+    fit: EffectFit
+    tried: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.look()
+
+    def look(self) -> None:
+        """Linearises about the present model."""
+        rows = np.flatnonzero(self.fit.inlier)
+        robot = self.kinematic.problem.robot
+        chosen = TermSet.of(robot, self.context, self.fit.terms)
+        problem, free = self.kinematic.problem, self.kinematic.free
+        near = linearise(problem, free, self.context, chosen, self.fit.p, self.fit.values)
+        self.seen, self.chain = self.context.subset(rows), near.chain.subset(rows)
+        self._raw = near.y[rows], near.kinematics[rows], near.effects[rows]
+        # What is in the model already is taken out together with the kinematics, at the sizes that were learnt.
+        y, J, A, prior = self.raw()
+        self.marginal = Marginal.of(y, np.concatenate([J, A], axis=2), prior, self.fit.sigma)
+        self.rigid = self.marginal.first(near.kinematics.shape[2])
+        self.left = self.marginal.y
+        nothing = self.marginal.problem(np.zeros((*self.left.shape, 0)))
+        self.base = self.infer(nothing, TermSet.of(robot, self.seen, ()))
+
+    def raw(self) -> tuple[Array, Array, Array, Array]:
+        """Readings ``(N, m)``, columns of the kinematics ``(N, m, k)`` and of the effects ``(N, m, K)``, priors."""
+        return *self._raw, np.concatenate([kinematic_prior(self.kinematic), self.fit.prior_size])
+
+    def infer(self, problem: LinearProblem, terms: TermSet, size: Array | None = None) -> Posterior:
+        """Sizes and noise for projected columns of some terms."""
+        return infer(problem, terms.group, terms.plausible, np.ones(len(terms)), [1.0] * len(problem.count), size)
+
+    def offered(self, terms: list[Term]) -> TermSet:
+        """Those parameters of the terms that are not in the model yet."""
+        present = {(t.effect, t.joint, t.moves, t.constants): {p.name for p in t.parameters} for t in self.fit.terms}
+        new = []
+        for term in terms:
+            have = present.get((term.effect, term.joint, term.moves, term.constants), set())
+            parameters = tuple(p for p in term.parameters if p.name not in have)
+            if parameters:
+                new.append(term.with_parameters(parameters))
+        return TermSet.of(self.kinematic.problem.robot, self.seen, new)
+
+    def project(self, terms: TermSet, marginal: Marginal) -> tuple[TermSet, Array]:
+        """The columns of terms, those left out that the kinematics imitates."""
+        raw = terms.columns(self.chain, len(self.fit.sigma))
+        columns = marginal.project(raw)
+        whole = np.sum((raw / self.fit.sigma[:, None]) ** 2, axis=(0, 1))
+        visible = np.sum(columns**2, axis=(0, 1)) > INVISIBLE * np.maximum(whole, 1e-300)
+        return (terms, columns) if visible.all() else (terms.only(visible), columns[:, :, visible])
+
+    def scores(self, terms: TermSet, columns: Array) -> tuple[Array, Array]:
+        """Score of each group against what is left, ``(groups,)`` chi-square and degrees of freedom."""
+        groups = range(len(terms.plausible))
+        chi2, dof = np.zeros(len(groups)), np.zeros(len(groups))
+        left = self.left.ravel()
+        for group in groups:
+            X = columns[:, :, terms.group == group].reshape(len(left), -1)
+            H = X.T @ X
+            scale = np.sqrt(np.diag(H))
+            values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
+            good = values > 1e-9 * max(len(values), 1)
+            b = vectors[:, good].T @ ((X.T @ left) / scale)
+            chi2[group], dof[group] = float(np.sum(b**2 / values[good])), int(good.sum())
+        return chi2, dof
+
+    def best_form(self, effect: Effect) -> list[Term]:
+        """The most promising of the effect's alternatives, searched coarsely, then finely."""
+        robot = self.kinematic.problem.robot
+        forms = effect.alternatives(robot, self.seen)
+        self.tried[effect.name] = len(forms) * max((len(form) for form in forms), default=1)
+        if len(forms) < 2:
+            return forms[0] if forms else []
+        best = max(forms, key=self._promise)
+        fine = effect.refined(best, robot, self.seen)
+        self.tried[effect.name] += len(fine)
+        return max([best, *fine], key=self._promise)
+
+    def _promise(self, form: list[Term]) -> float:
+        terms, columns = self.project(self.offered(form), self.rigid)
+        if not len(terms):
+            return 0.0
+        chi2, dof = self.scores(terms, columns)
+        return float(np.sum(np.maximum(0.5 * (chi2 - dof * np.log(self.left.size)), 0.0))) + 1e-3 * float(chi2.sum())
+
+    def trial(self, effect: Effect) -> Trial:
+        """What an effect would bring."""
+        terms, columns = self.project(self.offered(self.best_form(effect)), self.marginal)
+        if not len(terms):
+            return Trial(effect.name)
+        chi2, dof = self.scores(terms, columns)
+        promising = (stats.chi2.sf(chi2, dof) < WORTH_A_LOOK)[terms.group]
+        terms, columns = terms.only(promising), columns[:, :, promising]
+        problem, size = self.marginal.problem(columns), None
+        while len(terms):
+            posterior = self.infer(problem, terms, size)
+            keep = terms.spoken_for(posterior)
+            if keep.all():
+                forms = np.log(max(self.tried[effect.name] / len(terms.terms), 1.0))
+                gain = posterior.log_evidence - self.base.log_evidence - forms
+                return Trial(effect.name, float(gain), terms.terms)
+            size = posterior.size[np.unique(terms.group[keep])]
+            terms, problem = terms.only(keep), problem.only(keep)
+        return Trial(effect.name)
+
+    def gain_of(self, terms: Iterable[Term]) -> float:
+        """By how much the log evidence rises with stated terms."""
+        wanted, columns = self.project(self.offered(list(terms)), self.marginal)
+        if not len(wanted):
+            return -np.inf
+        return float(self.infer(self.marginal.problem(columns), wanted).log_evidence - self.base.log_evidence)
