@@ -8,12 +8,9 @@ import numpy as np
 
 from truepath.calibrate import KinematicFit
 from truepath.contest import LEAST_LOG_ODDS
-from truepath.effect_fit import fit_effects
 from truepath.effects import EFFECTS
 from truepath.effects.base import Term
 from truepath.effects.steps import clock_of
-from truepath.lie import Array
-from truepath.marginal import Marginal
 from truepath.motions import Moves
 from truepath.nameless import in_time, waves_of_a_joint
 from truepath.poe import ParameterName
@@ -83,28 +80,6 @@ def confusions_of_findings(search: Search, terms: tuple[Term, ...]) -> list[Conf
     return [confusion for confusion in found if confusion is not None]
 
 
-def _without(search: Search, own: tuple[Term, ...]) -> tuple[Marginal, Array, Array]:
-    """Everything but some terms taken out: the problem, and columns ``(N, m, k)`` of those terms; raw."""
-    robot = search.kinematic.problem.robot
-    terms = TermSet.of(robot, search.seen, search.fit.terms)
-    is_own = np.array([terms.terms[t] in own for t in terms.term], bool)
-    near_y, J, A, prior = search.raw()
-    k = J.shape[2]
-    others = np.concatenate([J, A[:, :, ~is_own]], axis=2)
-    marginal = Marginal.of(near_y, others, np.concatenate([prior[:k], prior[k:][~is_own]]), search.fit.sigma)
-    return marginal, A[:, :, is_own], near_y
-
-
-def _explained(marginal: Marginal, columns: Array) -> float:
-    """Chi-square that columns explain, less the number of them."""
-    X = marginal.project(columns).reshape(marginal.y.size, -1)
-    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
-    values, vectors = np.linalg.eigh((X / scale).T @ (X / scale))
-    good = values > 1e-9
-    b = vectors[:, good].T @ ((X / scale).T @ marginal.y.ravel())
-    return float(np.sum(b**2 / values[good])) - int(good.sum())
-
-
 def _sweep(search: Search, name: str, own: tuple[Term, ...], joint: int) -> Confusion | None:
     effect, context = EFFECTS[name], search.seen
     robot, clock = search.kinematic.problem.robot, "time" if context.time_s is not None else "the order of measurement"
@@ -120,19 +95,18 @@ def _sweep(search: Search, name: str, own: tuple[Term, ...], joint: int) -> Conf
         return None
     if not own:
         return None
-    marginal, columns, _ = _without(search, own)
-    explained = _explained(marginal, columns)
-    m = len(search.fit.sigma)
-    stand = TermSet.of(robot, context, stand_in).columns(search.chain, m)
-    if _explained(marginal, stand) < AS_GOOD * explained:
-        return None
-    if not others:
+    search.look(without=own)
+    explained = search.explained(own)
+    as_good = search.explained(stand_in) > AS_GOOD * explained
+    if as_good and not others:
         shares = {}
         for other in ("encoder_scale", "transmission_error", "axis_wobble"):
             offered = [t for t in EFFECTS[other].terms(robot, context) if t.joint == joint]
-            low = [t.with_parameters(t.parameters[:24]) for t in offered]
-            shares[other] = _explained(marginal, TermSet.of(robot, context, low).columns(search.chain, m)) / explained
+            shares[other] = search.explained(t.with_parameters(t.parameters[:24]) for t in offered) / explained
         others = [other for other, share in shares.items() if share > AS_GOOD] or [max(shares, key=lambda k: shares[k])]
+    search.look()
+    if not as_good:
+        return None
     why = (
         f"joint {joint} was swept once through the campaign, so that its angle and {clock} went along with each other: "
         f"{_plain(name)} and {' or '.join(_plain(other) for other in others)} explain the readings about equally well. "
@@ -142,14 +116,12 @@ def _sweep(search: Search, name: str, own: tuple[Term, ...], joint: int) -> Conf
 
 
 def _equals(search: Search, name: str, terms: tuple[Term, ...]) -> Confusion | None:
-    full = search.fit
-    search.fit = fit_effects(search.kinematic, search.context, [term for term in terms if term.effect != name])
-    search.look()
+    own = tuple(term for term in terms if term.effect == name)
+    search.look(without=own)
     trials = {}
     for other in COMPACT:
         if not EFFECTS[other].missing(search.seen) and (other == name or other not in {t.effect for t in terms}):
             trials[other] = search.trial(EFFECTS[other])
-    search.fit = full
     search.look()
     gain = trials[name].gain
     rivals = [other for other, trial in trials.items() if other != name and trial.gain > gain - CLOSE_ODDS]
@@ -160,7 +132,6 @@ def _equals(search: Search, name: str, terms: tuple[Term, ...]) -> Confusion | N
         f"{_plain(name)} and {' or '.join(_plain(rival) for rival in rivals)} explain the readings about equally well "
         f"(the log odds differ by less than {CLOSE_ODDS:g}). More poses, further apart, would tell."
     )
-    own = tuple(term for term in terms if term.effect == name)
     return Confusion((name, *rivals), why, (*own, *best.terms), withdrawn=name, everywhere=True)
 
 
@@ -196,7 +167,7 @@ def common_length(search: Search, kinematic: KinematicFit) -> Confusion | None:
     robot = search.kinematic.problem.robot
     names: list[ParameterName] = [name for name, free in zip(kinematic.names, kinematic.fit.free, strict=True) if free]
     term = EFFECTS["measurement_scale"].terms(robot, search.seen)[0]
-    _, J, _, _ = search.raw()
+    J = search.by_kinematics
     column = search.chain.displacement(Moves.ROBOT_LENGTHS)[:, : len(search.fit.sigma)]
     step = np.linalg.lstsq(
         (J / search.fit.sigma[:, None]).reshape(-1, J.shape[2]),
@@ -222,7 +193,7 @@ def common_length(search: Search, kinematic: KinematicFit) -> Confusion | None:
     )
     why = (
         f"all lengths are {100 * abs(scale):.3f} % {'long' if scale > 0 else 'short'} on average "
-        f"(+- {100 * scatter:.3f} %, {telling}): check the tracker's scale or the temperature. A tracker whose metre "
+        f"(± {100 * scatter:.3f} %, {telling}): check the tracker's scale or the temperature. A tracker whose metre "
         "is off, a robot as a whole warmer or colder than its drawing, and links of another length give the same "
         "readings; poses at another temperature (temperature_c recorded), or a known length, would tell."
     )

@@ -62,6 +62,7 @@ def choose(
     contest.run()
     if contest.examine():
         contest.run()
+    contest.simplify()
     named = tuple(term for term in search.fit.terms if term.effect in EFFECTS)
     others = tuple(term for term in search.fit.terms if term.effect not in EFFECTS)
     return Choice(search.fit, named, others, sum(search.tried.values()))

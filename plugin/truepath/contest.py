@@ -16,6 +16,7 @@ LEAST_LOG_ODDS = 10.0  # for an effect: odds of 22,000 to 1, decisive by far (Ka
 NAMED_SHARE = 0.5  # of the evidence for a nameless form that a named effect must reach to be above suspicion
 JOINT_SHARE = 0.8  # of it that all suspects together must reach
 MOST_ROUNDS = 16
+WAVES, SIMPLE = ("transmission_error", "axis_wobble"), ("encoder_scale", "joint_compliance", "backlash")
 
 Progress = Callable[[str], None]
 
@@ -78,6 +79,28 @@ class Contest:
         self._take(rival)
         self.gains.clear()
         return True
+
+    def simplify(self) -> None:
+        """Waves that a cause with a single number explains as well give way to it.
+
+        Waves can imitate anything that depends on the angle of a joint, and come first as long as other causes are
+        in the way.
+        """
+        simple = [effect for effect in self.named if effect.name in SIMPLE]
+        for term in self.search.fit.terms:
+            if term.effect not in WAVES:
+                continue
+            self.search.look(without=[term])
+            own = self.search.gain_of([term])
+            robot, seen = self.search.kinematic.problem.robot, self.search.seen
+            offers = [t for effect in simple for t in effect.terms(robot, seen) if t.joint == term.joint]
+            gains = {offer.effect: self.search.gain_of([offer]) for offer in offers}
+            best = max(gains, key=lambda name: gains[name], default="")
+            if best and gains[best] > own:
+                others = [t for t in self.search.fit.terms if t is not term]
+                self._fit(merged(others, [offer for offer in offers if offer.effect == best]))
+            else:
+                self.search.look()
 
     def _best_of(self, effects: Iterable[Effect], fresh: dict[str, Trial], promise: float) -> Trial | None:
         """The best of those that brought more than ``promise`` the last time, if it passes."""

@@ -103,7 +103,7 @@ def diagnose(
         calibration=describe(robot, measurements, fit, source, verification),
         fit=fit,
         outlier=fit.outlier,
-        unseen=unseen,
+        unseen=trial.unseen,
         stages=tuple(_stages(trial, findings)),
         findings=findings,
         ambiguous=tuple(_ambiguities(evidence, kinematic, spec, plan, progress)),

@@ -59,16 +59,19 @@ class CrossValidation:
         """
         worst = dict.fromkeys(groups, 0.0)
         for folds in (_random_folds(visits), _block_folds(len(self.y))):
-            products: dict[str, list[Array]] = {name: [] for name in groups}
+            agreement, spread = dict.fromkeys(groups, 0.0), dict.fromkeys(groups, 0.0)
             for rows in folds:
-                for name, product in self._left_out(rows, groups).items():
-                    products[name].append(product)
-            for name, parts in products.items():
-                worst[name] = max(worst[name], _one_sided(np.concatenate(parts)))
+                for name, (predicted, left) in self._left_out(rows, groups).items():
+                    agreement[name] += float(np.sum(predicted * left))
+                    spread[name] += float(np.sum(predicted**2))
+            for name in groups:
+                # What is left is noise of size 1 if the cause is not real.
+                z = agreement[name] / np.sqrt(spread[name]) if spread[name] > 0 else 0.0
+                worst[name] = max(worst[name], float(stats.norm.sf(z)))
         return worst
 
-    def _left_out(self, rows: Array, groups: Mapping[str, Array]) -> dict[str, Array]:
-        """``(len(rows),)`` by set of columns: its prediction times what is left without it."""
+    def _left_out(self, rows: Array, groups: Mapping[str, Array]) -> dict[str, tuple[Array, Array]]:
+        """By set of columns: its prediction for the rows left out, and what is left there without it."""
         k = self.A.shape[2]
         seen = np.ones(len(self.y), bool)
         seen[rows] = False
@@ -84,7 +87,7 @@ class CrossValidation:
             change = covariance[:, own] @ np.linalg.solve(own_covariance, x[own])
             predicted = self.A[rows] @ change
             left = self.y[rows] - self.A[rows] @ (x - change)
-            out[name] = np.sum(predicted * left, axis=1)
+            out[name] = predicted, left
         return out
 
 
@@ -99,9 +102,3 @@ def _block_folds(count: int) -> list[Array]:
     """Every fold takes some short blocks, so that a slow drift can be followed on both sides of each."""
     block = np.arange(count) * FOLDS * BLOCKS_PER_FOLD // count
     return [np.flatnonzero(block % FOLDS == fold) for fold in range(FOLDS)]
-
-
-def _one_sided(products: Array) -> float:
-    """Probability that products without a true mean come out so large."""
-    spread = float(np.sqrt(np.sum(products**2)))
-    return float(stats.norm.sf(products.sum() / spread)) if spread > 0 else 1.0

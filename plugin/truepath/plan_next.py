@@ -43,10 +43,9 @@ def poses_that_tell(
     if not len(drawn):
         return None
     search = Search(kinematic.fit, context, fit)
-    so_far = _columns(search.raw()[1], search.chain, TermSet.of(robot, search.seen, confusion.terms), fit.sigma)
+    so_far = _columns(search.by_kinematics, search.chain, TermSet.of(robot, search.seen, confusion.terms), fit.sigma)
     plausible = np.array([parameter.prior_scale for term in confusion.terms for parameter in term.parameters])
-    kinematic_prior = search.raw()[3][: so_far.shape[2] - len(plausible)]
-    prior = np.concatenate([kinematic_prior, plausible])
+    prior = np.concatenate([search.kinematic_prior, plausible])
     rows = so_far.reshape(-1, so_far.shape[2])
     H = rows.T @ rows + np.diag(prior**-2.0)
     scale = np.diag(H) ** -0.5

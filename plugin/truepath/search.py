@@ -43,6 +43,10 @@ class Search:
         context: of all its poses.
         fit: the present model.
         tried: hypotheses so far, by effect.
+        present: its terms but for those left to be found anew.
+        seen: context of the rows that count.
+        chain: where everything is, for these.
+        marginal: their readings, with the kinematics and the present terms taken out.
     """
 
     kinematic: RobustFit
@@ -53,26 +57,26 @@ class Search:
     def __post_init__(self) -> None:
         self.look()
 
-    def look(self) -> None:
-        """Linearises about the present model."""
+    def look(self, without: Iterable[Term] = ()) -> None:
+        """Linearises about the present model; some of its terms can be left to be found anew."""
         rows = np.flatnonzero(self.fit.inlier)
         robot = self.kinematic.problem.robot
         chosen = TermSet.of(robot, self.context, self.fit.terms)
         problem, free = self.kinematic.problem, self.kinematic.free
         near = linearise(problem, free, self.context, chosen, self.fit.p, self.fit.values)
         self.seen, self.chain = self.context.subset(rows), near.chain.subset(rows)
-        self._raw = near.y[rows], near.kinematics[rows], near.effects[rows]
+        self.by_kinematics, self.kinematic_prior = near.kinematics[rows], kinematic_prior(self.kinematic)
+        absent = tuple(without)
+        self.present = tuple(term for term in self.fit.terms if term not in absent)
+        stays = np.array([chosen.terms[t] not in absent for t in chosen.term], bool)
         # What is in the model already is taken out together with the kinematics, at the sizes that were learnt.
-        y, J, A, prior = self.raw()
-        self.marginal = Marginal.of(y, np.concatenate([J, A], axis=2), prior, self.fit.sigma)
-        self.rigid = self.marginal.first(near.kinematics.shape[2])
+        J = np.concatenate([self.by_kinematics, near.effects[rows][:, :, stays]], axis=2)
+        prior = np.concatenate([self.kinematic_prior, self.fit.prior_size[stays]])
+        self.marginal = Marginal.of(near.y[rows], J, prior, self.fit.sigma)
+        self.rigid = self.marginal.first(len(self.kinematic_prior))
         self.left = self.marginal.y
         nothing = self.marginal.problem(np.zeros((*self.left.shape, 0)))
         self.base = self.infer(nothing, TermSet.of(robot, self.seen, ()))
-
-    def raw(self) -> tuple[Array, Array, Array, Array]:
-        """Readings ``(N, m)``, columns of the kinematics ``(N, m, k)`` and of the effects ``(N, m, K)``, priors."""
-        return *self._raw, np.concatenate([kinematic_prior(self.kinematic), self.fit.prior_size])
 
     def infer(self, problem: LinearProblem, terms: TermSet, size: Array | None = None) -> Posterior:
         """Sizes and noise for projected columns of some terms."""
@@ -80,7 +84,7 @@ class Search:
 
     def offered(self, terms: list[Term]) -> TermSet:
         """Those parameters of the terms that are not in the model yet."""
-        present = {(t.effect, t.joint, t.moves, t.constants): {p.name for p in t.parameters} for t in self.fit.terms}
+        present = {(t.effect, t.joint, t.moves, t.constants): {p.name for p in t.parameters} for t in self.present}
         new = []
         for term in terms:
             have = present.get((term.effect, term.joint, term.moves, term.constants), set())
@@ -150,6 +154,18 @@ class Search:
             size = posterior.size[np.unique(terms.group[keep])]
             terms, problem = terms.only(keep), problem.only(keep)
         return Trial(effect.name)
+
+    def explained(self, terms: Iterable[Term]) -> float:
+        """Chi-square that stated terms explain of what is left, less the number of their parameters."""
+        own, columns = self.project(TermSet.of(self.kinematic.problem.robot, self.seen, tuple(terms)), self.marginal)
+        if not len(own):
+            return 0.0
+        X = columns.reshape(self.left.size, -1)
+        X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-12)
+        values, vectors = np.linalg.eigh(X.T @ X)
+        good = values > 1e-9
+        b = vectors[:, good].T @ (X.T @ self.left.ravel())
+        return float(np.sum(b**2 / values[good])) - int(good.sum())
 
     def gain_of(self, terms: Iterable[Term]) -> float:
         """By how much the log evidence rises with stated terms."""

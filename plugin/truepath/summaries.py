@@ -12,9 +12,9 @@ from truepath.motions import COMPONENTS
 from truepath.robot import NominalRobot
 
 READABLE = {  # unit of a parameter: factor and name of the unit that people use
-    "rad": (1e6, "urad"),
-    "m": (1e6, "um"),
-    "rad/(N m)": (1e6, "urad/(N m)"),
+    "rad": (1e6, "µrad"),
+    "m": (1e6, "µm"),
+    "rad/(N m)": (1e6, "µrad/(N m)"),
     "1/K": (1e6, "ppm/K"),
     "m/m": (1e6, "ppm"),
     "rad/rad": (1e6, "ppm"),
@@ -59,7 +59,7 @@ def _moved(fitted: FittedTerm, motion: Array) -> str:
     shifts = [i for i, name in enumerate(components) if name in ("x", "y", "z")]
     turns = [i for i in range(len(components)) if i not in shifts]
     parts = []
-    for own, unit in ((shifts, "um"), (turns, "urad")):
+    for own, unit in ((shifts, "µm"), (turns, "µrad")):
         length = 1e6 * float(np.linalg.norm(size[own])) if own else 0.0
         if length >= 0.05:
             parts.append(f"{length:.3g} {unit}")
@@ -83,6 +83,6 @@ def _strongest_waves(fitted: FittedTerm) -> str:
         return ""
     ranked = sorted(power, key=lambda cycles: -power[cycles])[:MOST_CYCLES]
     strong = sorted(cycles for cycles in ranked if power[cycles] > 0.15 * power[ranked[0]])
-    names = [f"{cycles:.3g}" for cycles in strong]
+    names = [f"{cycles:.2g}" if cycles < 10 else f"{cycles:.0f}" for cycles in strong]
     text = names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
     return f"{text} cycles per turn" if strong != [1.0] else "1 cycle per turn"

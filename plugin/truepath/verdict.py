@@ -26,7 +26,11 @@ def verdict(diagnosis: Diagnosis) -> str:
         text += f"; what is left looks like noise, of which {floor:.3f} mm are expected"
     real = [item for item in diagnosis.ambiguous if "measurement_scale" not in item.effects]
     if real:
-        text += f"; {_list([' and '.join(_plain(e) for e in item.effects) for item in real])} cannot be told apart"
+        groups = [
+            " from ".join([_plain(item.effects[0]), _list([_plain(e) for e in item.effects[1:]], "or")])
+            for item in real
+        ]
+        text += f"; these data do not tell {'; nor '.join(groups)}"
     return text + "."
 
 
@@ -65,5 +69,5 @@ def _plain(name: str) -> str:
     return name.replace("_", " ").replace("kinematic", "geometry")
 
 
-def _list(parts: list[str]) -> str:
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1] if parts else ""
+def _list(parts: list[str], last: str = "and") -> str:
+    return ", ".join(parts[:-1]) + f" {last} {parts[-1]}" if len(parts) > 1 else "".join(parts)
