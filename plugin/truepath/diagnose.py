@@ -7,38 +7,29 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
 from threadpoolctl import threadpool_limits
 
-from truepath import lie
 from truepath.calibrate import Fit, KinematicFit, finish, fit_kinematics
 from truepath.calibration_parts import HeldOutPart
 from truepath.context import Context
 from truepath.describe import describe, held_out
-from truepath.diagnosis import Ambiguity, Diagnosis, Finding, FoundParameter, Gain, Stage, Unexplained
+from truepath.diagnosis import Ambiguity, Diagnosis, Finding, FoundParameter, Stage, Unexplained
 from truepath.effect_fit import fit_effects
 from truepath.effects import EFFECTS
-from truepath.effects.base import Term
 from truepath.errors import CalibrationError
-from truepath.findings import SIGNIFICANT, Evidence, gather
-from truepath.iso9283 import Accuracy, accuracy
+from truepath.findings import Evidence, gather
 from truepath.learn import cross_validate
-from truepath.leftover import alike_by_chance, noise_floor_mm
 from truepath.lie import Array
 from truepath.measurements import Measurements
-from truepath.model import CalibratedModel
-from truepath.motions import ChainPoses, Moves
-from truepath.nameless import NAMELESS
 from truepath.plan_next import poses_that_tell
 from truepath.robot import NominalRobot
 from truepath.summaries import summary
+from truepath.unexplained import unexplained
+from truepath.unseen import UnseenPoses
 from truepath.verdict import not_testable, verdict
 
 PARTS = 5  # one of them is kept away from fit and choice
 ENOUGH_POSES = 1600  # to see what is there; more only takes longer
-A_PATTERN = 0.001  # p value of a pattern that no form describes
-GROSS = 10.0  # times the median miss: no model is to blame for such a reading
-LEAST_LEVER_M = 0.03
 
 Progress = Callable[[str], None]
 
@@ -80,11 +71,11 @@ def diagnose(
         return _too_few(whole, source)
     evidence = gather(kinematic, measurements.subset(looked_at).groups(), progress)
     progress("measuring the gain on poses kept away")
-    trial = _Trial(kinematic, evidence, measurements, context, unseen)
+    trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
     if evidence.named and trial.mean(trial.final) >= trial.mean(trial.kinematic):
         # What does not help on poses that nobody has looked at is not put into a model.
         evidence = replace(evidence, named=(), fit=fit_effects(kinematic.fit, kinematic.context, ()))
-        trial = _Trial(kinematic, evidence, measurements, context, unseen)
+        trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
     findings = _findings(trial, evidence)
     progress(f"fitting all {len(measurements)} poses")
     whole = fit_kinematics(robot, measurements, context)
@@ -96,7 +87,6 @@ def diagnose(
         verification = held_out(how, int(trial.unseen.sum()), *accuracies)
     else:
         verification = cross_validate(robot, measurements.subset(~fit.outlier), (), progress)
-    unexplained = _unexplained(trial, evidence)
     diagnosis = Diagnosis(
         verdict="",
         measurements=measurements,
@@ -107,7 +97,7 @@ def diagnose(
         stages=tuple(_stages(trial, findings)),
         findings=findings,
         ambiguous=tuple(_ambiguities(evidence, kinematic, spec, plan, progress)),
-        unexplained=unexplained,
+        unexplained=unexplained(trial, evidence),
         not_testable=tuple(not_testable(robot, context)),
         seen_models={"kinematic": trial.kinematic, "final": trial.final},
         residuals={name: trial.residual(name) for name in ("nominal", "kinematic", "final")},
@@ -116,81 +106,7 @@ def diagnose(
     return replace(diagnosis, verdict=verdict(diagnosis))
 
 
-class _Trial:
-    """Models fitted to the poses that were looked at, on those that were not.
-
-    Attributes:
-        kinematic, final: without and with the findings.
-        unseen: ``(N,)`` True for poses to judge by; gross errors are left out, the kinematic model being the judge,
-            so that no pose is left out because an effect fails on it.
-    """
-
-    def __init__(
-        self, fit: KinematicFit, evidence: Evidence, measurements: Measurements, context: Context, unseen: Array
-    ) -> None:
-        self.fit, self.evidence, self.measurements, self.context = fit, evidence, measurements, context
-        self.kinematic, self.final = self.model(()), finish(fit, evidence.fit).model
-        miss = np.linalg.norm(self.kinematic.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
-        self.sane = miss <= GROSS * np.median(miss)
-        self.unseen = unseen & self.sane
-
-    def model(self, terms: tuple[Term, ...]) -> CalibratedModel:
-        """The kinematics with some terms."""
-        return finish(self.fit, fit_effects(self.fit.fit, self.fit.context, terms, prune=False)).model
-
-    def predict(self, model: CalibratedModel | str) -> Array:
-        """``(N, 4, 4)``."""
-        if model == "nominal":
-            return self.final.predict_nominal(self.context)
-        chosen = getattr(self, model) if isinstance(model, str) else model
-        return chosen.predict(self.context)
-
-    def accuracy(self, model: CalibratedModel | str) -> Accuracy:
-        """On the unseen poses."""
-        part = self.measurements.subset(self.unseen)
-        return accuracy(self.predict(model)[self.unseen], part.p_ME, part.R_ME, part.groups())
-
-    def errors_mm(self, model: CalibratedModel) -> Array:
-        """``(k,)`` on the unseen poses."""
-        error = model.predict(self.context.subset(self.unseen))[:, :3, 3] - self.measurements.p_ME[self.unseen]
-        return 1e3 * np.linalg.norm(error, axis=1)
-
-    def mean(self, model: CalibratedModel) -> float:
-        """Mean error on the unseen poses, mm."""
-        return float(self.errors_mm(model).mean())
-
-    def gain(self, without: CalibratedModel) -> Gain:
-        """Of the final model over another, with Student's interval of the paired difference."""
-        before, after = self.errors_mm(without), self.errors_mm(self.final)
-        difference = before - after
-        mean, k = float(difference.mean()), len(difference)
-        half = float(stats.t.ppf(0.975, k - 1) * difference.std(ddof=1) / np.sqrt(k)) if k > 1 else np.inf
-        return Gain(float(before.mean()), float(after.mean()), (mean - half, mean + half))
-
-    def residual(self, model: str) -> Array:
-        """``(N, m)`` predicted less measured, in M."""
-        X_ME = self.predict(model)
-        residual = X_ME[:, :3, 3] - self.measurements.p_ME
-        if self.measurements.R_ME is None:
-            return residual
-        turn = lie.rotation_vector(X_ME[:, :3, :3] @ np.swapaxes(self.measurements.R_ME, 1, 2))
-        return np.concatenate([residual, turn], axis=1)
-
-    def joint_view(self, model: str) -> Array:
-        """``(N, n)`` turn of each joint alone that would explain the residual of a pose best, rad."""
-        final, residual = self.final, self.residual(model)[:, :3]
-        phi = final.true_joints(self.context)
-        chain = ChainPoses.of(final.robot, final.p, phi, final.X_MB, final.X_FE)
-        view = np.full(phi.shape, np.nan)
-        for joint in range(1, phi.shape[1] + 1):
-            moved = chain.displacement(Moves.JOINT, joint)[:, :3, 0]
-            lever2 = np.sum(moved**2, axis=1)
-            seen = lever2 > LEAST_LEVER_M**2
-            view[seen, joint - 1] = -np.sum(moved * residual, axis=1)[seen] / lever2[seen]
-        return view
-
-
-def _findings(trial: _Trial, evidence: Evidence) -> tuple[Finding, ...]:
+def _findings(trial: UnseenPoses, evidence: Evidence) -> tuple[Finding, ...]:
     found = []
     for name in dict.fromkeys(term.effect for term in evidence.named):
         others = tuple(term for term in evidence.named if term.effect != name)
@@ -215,7 +131,7 @@ def _findings(trial: _Trial, evidence: Evidence) -> tuple[Finding, ...]:
     return tuple(sorted(found, key=lambda f: f.gain.after_mm - f.gain.before_mm))
 
 
-def _stages(trial: _Trial, findings: tuple[Finding, ...]) -> list[Stage]:
+def _stages(trial: UnseenPoses, findings: tuple[Finding, ...]) -> list[Stage]:
     stages = [Stage("nominal", trial.accuracy("nominal")), Stage("kinematic", trial.accuracy("kinematic"))]
     for count in range(1, len(findings) + 1):
         names = [finding.effect for finding in findings[:count]]
@@ -223,29 +139,6 @@ def _stages(trial: _Trial, findings: tuple[Finding, ...]) -> list[Stage]:
         model = trial.final if count == len(findings) else trial.model(terms)
         stages.append(Stage("+".join(["kinematic", *names]), trial.accuracy(model)))
     return stages
-
-
-def _unexplained(trial: _Trial, evidence: Evidence) -> Unexplained:
-    looked_at = trial.fit.measurements.subset(evidence.fit.inlier)
-    residual = evidence.fit.residual[evidence.fit.inlier]
-    p_alike = alike_by_chance(looked_at, residual, evidence.fit.sigma)
-    p_forms = [evidence.p_values[term.effect] for term in evidence.nameless]
-    floor, source = noise_floor_mm(looked_at, residual)
-    places: dict[str, set[int]] = {}
-    for term in evidence.nameless:
-        places.setdefault(term.effect, set()).update([] if term.joint is None else [term.joint])
-    hints = tuple(
-        NAMELESS[name].hint + (f" (joint {', '.join(str(joint) for joint in sorted(joints))})" if joints else "")
-        for name, joints in places.items()
-    )
-    return Unexplained(
-        structured=min([*p_forms, 1.0]) < SIGNIFICANT or p_alike < A_PATTERN,
-        p_value=float(min([*p_forms, p_alike])),
-        heldout_mm=trial.mean(trial.final),
-        noise_floor_mm=floor,
-        floor_from=source,
-        hints=hints,
-    )
 
 
 def _ambiguities(

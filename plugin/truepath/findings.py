@@ -17,6 +17,7 @@ from truepath.held_out import CrossValidation
 from truepath.lie import Array
 from truepath.search import Search
 
+LEAST_P = 1e-300  # smaller ones are not told apart
 SIGNIFICANT = 0.01  # p value of a finding, all hypotheses that were tried taken into account
 
 Progress = Callable[[str], None]
@@ -91,7 +92,7 @@ def _validated(
         corrected |= {str(t): p[str(t)] * places[term.effect] for t, term in enumerate(fit.terms)}
         worst = max(corrected, key=lambda name: corrected[name], default="")
         if not worst or corrected[worst] <= SIGNIFICANT:
-            return fit, {name: min(corrected[name], 1.0) for name in by_effect}
+            return fit, {name: float(np.clip(corrected[name], LEAST_P, 1.0)) for name in by_effect}
         if worst in by_effect:
             terms = [term for term in fit.terms if term.effect != worst]
         else:

@@ -35,7 +35,7 @@ def summary(fitted: FittedTerm, context: Context, robot: NominalRobot) -> str:
     if len(term.parameters) == 1:
         factor, unit = READABLE[term.parameters[0].unit]
         text = (
-            f"{place}{term.parameters[0].name} {factor * fitted.values[0]:.4g} +- {factor * fitted.sigma[0]:.2g} {unit}"
+            f"{place}{term.parameters[0].name} {factor * fitted.values[0]:.4g} ± {factor * fitted.sigma[0]:.2g} {unit}"
         )
     else:
         text = place + _moved(fitted, motions(robot, context, fitted))

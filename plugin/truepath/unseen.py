@@ -1,0 +1,96 @@
+"""Models fitted to the poses that were looked at, judged on those that were not."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import stats
+
+from truepath import lie
+from truepath.calibrate import KinematicFit, finish
+from truepath.context import Context
+from truepath.diagnosis import Gain
+from truepath.effect_fit import fit_effects
+from truepath.effects.base import Term
+from truepath.findings import Evidence
+from truepath.iso9283 import Accuracy, accuracy
+from truepath.lie import Array
+from truepath.measurements import Measurements
+from truepath.model import CalibratedModel
+from truepath.motions import ChainPoses, Moves
+
+GROSS = 10.0  # times the median miss: no model is to blame for such a reading
+LEAST_LEVER_M = 0.03
+
+
+class UnseenPoses:
+    """Models fitted to the poses that were looked at, on those that were not.
+
+    Attributes:
+        kinematic, final: without and with the findings.
+        unseen: ``(N,)`` True for poses to judge by; gross errors are left out, the kinematic model being the judge,
+            so that no pose is left out because an effect fails on it.
+    """
+
+    def __init__(
+        self, fit: KinematicFit, evidence: Evidence, measurements: Measurements, context: Context, unseen: Array
+    ) -> None:
+        self.fit, self.evidence, self.measurements, self.context = fit, evidence, measurements, context
+        self.kinematic, self.final = self.model(()), finish(fit, evidence.fit).model
+        miss = np.linalg.norm(self.kinematic.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
+        self.sane = miss <= GROSS * np.median(miss)
+        self.unseen = unseen & self.sane
+
+    def model(self, terms: tuple[Term, ...]) -> CalibratedModel:
+        """The kinematics with some terms."""
+        return finish(self.fit, fit_effects(self.fit.fit, self.fit.context, terms, prune=False)).model
+
+    def predict(self, model: CalibratedModel | str) -> Array:
+        """``(N, 4, 4)``."""
+        if model == "nominal":
+            return self.final.predict_nominal(self.context)
+        chosen = getattr(self, model) if isinstance(model, str) else model
+        return chosen.predict(self.context)
+
+    def accuracy(self, model: CalibratedModel | str) -> Accuracy:
+        """On the unseen poses."""
+        part = self.measurements.subset(self.unseen)
+        return accuracy(self.predict(model)[self.unseen], part.p_ME, part.R_ME, part.groups())
+
+    def errors_mm(self, model: CalibratedModel) -> Array:
+        """``(k,)`` on the unseen poses."""
+        error = model.predict(self.context.subset(self.unseen))[:, :3, 3] - self.measurements.p_ME[self.unseen]
+        return 1e3 * np.linalg.norm(error, axis=1)
+
+    def mean(self, model: CalibratedModel) -> float:
+        """Mean error on the unseen poses, mm."""
+        return float(self.errors_mm(model).mean())
+
+    def gain(self, without: CalibratedModel) -> Gain:
+        """Of the final model over another, with Student's interval of the paired difference."""
+        before, after = self.errors_mm(without), self.errors_mm(self.final)
+        difference = before - after
+        mean, k = float(difference.mean()), len(difference)
+        half = float(stats.t.ppf(0.975, k - 1) * difference.std(ddof=1) / np.sqrt(k)) if k > 1 else np.inf
+        return Gain(float(before.mean()), float(after.mean()), (mean - half, mean + half))
+
+    def residual(self, model: str) -> Array:
+        """``(N, m)`` predicted less measured, in M."""
+        X_ME = self.predict(model)
+        residual = X_ME[:, :3, 3] - self.measurements.p_ME
+        if self.measurements.R_ME is None:
+            return residual
+        turn = lie.rotation_vector(X_ME[:, :3, :3] @ np.swapaxes(self.measurements.R_ME, 1, 2))
+        return np.concatenate([residual, turn], axis=1)
+
+    def joint_view(self, model: str) -> Array:
+        """``(N, n)`` turn of each joint alone that would explain the residual of a pose best, rad."""
+        final, residual = self.final, self.residual(model)[:, :3]
+        phi = final.true_joints(self.context)
+        chain = ChainPoses.of(final.robot, final.p, phi, final.X_MB, final.X_FE)
+        view = np.full(phi.shape, np.nan)
+        for joint in range(1, phi.shape[1] + 1):
+            moved = chain.displacement(Moves.JOINT, joint)[:, :3, 0]
+            lever2 = np.sum(moved**2, axis=1)
+            seen = lever2 > LEAST_LEVER_M**2
+            view[seen, joint - 1] = -np.sum(moved * residual, axis=1)[seen] / lever2[seen]
+        return view
