@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from command import run
 from hidden import Hidden, none
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -152,6 +153,16 @@ def clean(real_ur5):
 def clean_kinematic(real_ur5, clean):
     """The kinematics fitted to these."""
     return fit_kinematics(real_ur5.robot, clean)
+
+
+@pytest.fixture
+def truepath(monkeypatch, capsys):
+    """Function: runs the command in this process, as the entry point does."""
+
+    def truepath(*arguments):
+        return run(monkeypatch, capsys, *arguments)
+
+    return truepath
 
 
 INSERTIONS = [b",", b";", b"\n", b"\r", b'"', b"\x00", b"\xff", b"-", b"e", b".", b"_", b"nan", b"9" * 400, b"{", b"]"]

@@ -7,43 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import is_refused
 from drake_arm import DrakeArm
 from truepath import plants
 from truepath.calibration import load_calibration
-from truepath.cli import app, main
+from truepath.cli import app
 from truepath.programs.toolpath_csv import read_toolpath
 from truepath.virtual.real_robot import RealRobot
 from typer.main import get_command
 
-COMMANDS = ("calibrate", "validate", "correct", "preview", "export", "simulate", "demo")
+COMMANDS = ("calibrate", "diagnose", "validate", "correct", "preview", "export", "simulate", "demo")
 WELD_PATH = plants.models_dir() / "ur5" / "weld_path.csv"
 POSE_PATH = plants.models_dir() / "ur5" / "pose_path.csv"
 HEAVY = ("numpy", "scipy", "torch", "pydrake", "casadi", "pydantic", "yourdfpy", "meshcat")
-
-
-class Outcome:
-    def __init__(self, code, out, err):
-        self.code, self.out, self.err = code, out, err
-
-    def json(self):
-        return json.loads(self.out)
-
-
-@pytest.fixture
-def truepath(monkeypatch, capsys):
-    """Function: runs the command in this process, as the entry point does."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["truepath", *map(str, arguments)])
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = stop.code or 0
-        captured = capsys.readouterr()
-        return Outcome(code, captured.out, captured.err)
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -70,17 +46,6 @@ calibrate measured.csv -o ur5.json --robot ur5_cell --measured-in world --probe 
     (folder / "moved_few.csv").write_text("".join(moved[:13]))
     (folder / "moved_rest.csv").write_text("".join(moved[:1] + moved[13:]))
     return folder
-
-
-def is_refused(outcome, *words):
-    """Exit code 2 and one clear message on standard error, nothing else."""
-    assert outcome.code == 2, outcome.err
-    assert outcome.out == ""
-    assert "Traceback" not in outcome.err
-    assert outcome.err.count("error:") == 1
-    for word in words:
-        assert word in outcome.err
-    return True
 
 
 # Help

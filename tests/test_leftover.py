@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from truepath.leftover import alike_by_chance, noise_floor_mm
+from truepath.leftover import alike_by_chance, more_than_repeats, noise_floor_mm, spread
 from truepath.measurements import Measurements
 
 SIGMA_M = 5e-5
@@ -81,16 +81,46 @@ def test_the_floor_is_one_of_positions_even_where_orientation_is_measured():
     assert noise_floor_mm(measured(joints(400)), residual)[0] == pytest.approx(FLOOR_MM, rel=0.1)
 
 
+# More than repeats allow
+
+
+def test_residuals_of_nothing_but_noise_are_no_larger_than_repeats_allow_and_their_chances_are_even():
+    """A quarter of 300 p values below a quarter, half below a half, all of it within what a binomial does."""
+    visits = np.tile(np.arange(40), 3)
+    q = joints(40)[visits]
+    found = np.array([more_than_repeats(measured(q, pose_id=visits), noise(120, seed)) for seed in range(300)])
+    for level in (0.05, 0.25, 0.5):
+        assert abs(np.sum(found < level) - 300 * level) < 3.5 * np.sqrt(300 * level * (1 - level))
+
+
+def test_errors_that_all_visits_of_a_pose_share_are_more_than_repeats_allow():
+    visits = np.tile(np.arange(40), 3)
+    q = joints(40)
+    residual = 0.3 * pattern(q)[visits] + noise(120)
+    assert more_than_repeats(measured(q[visits], pose_id=visits), residual) < 1e-6
+
+
+def test_without_repeats_nobody_can_say_what_they_allow():
+    assert more_than_repeats(measured(joints(100)), pattern(joints(100)) + noise(100)) == 1.0
+
+
 # Patterns
+
+
+def chance(q, residual, *views, time=False):
+    """Probability of such likeness, in all joints, one joint or two, or in time."""
+    spaces = [spread(q)] if not time else [spread(q), np.arange(len(q))[:, None]]
+    return alike_by_chance(residual, np.full(residual.shape[1], SIGMA_M), spaces, views)
 
 
 @pytest.fixture(scope="module")
 def by_chance():
-    """300 probabilities for residuals that are nothing but noise."""
+    """300 probabilities for residuals that are nothing but noise, in several spaces and views."""
     found = []
     for seed in range(300):
         q = joints(150, seed)
-        found.append(alike_by_chance(measured(q), noise(150, 1000 + seed), np.full(3, SIGMA_M)))
+        view = np.broadcast_to(np.eye(3), (150, 3, 3))
+        found.append(chance(q, noise(150, 1000 + seed), view, time=True))
     return np.array(found)
 
 
@@ -104,31 +134,48 @@ def test_probabilities_are_probabilities_and_often_large(by_chance):
     assert np.median(by_chance) > 0.4
 
 
+def test_the_more_places_are_searched_the_more_a_likeness_has_to_be():
+    q, residual = joints(200), 0.2 * pattern(joints(200)) + noise(200)
+    few = alike_by_chance(residual, np.full(3, SIGMA_M), [spread(q)], [])
+    many = alike_by_chance(residual, np.full(3, SIGMA_M), [spread(q), *[joints(200, k) for k in range(3, 12)]], [])
+    assert many >= min(1.0, few)
+
+
 def test_what_goes_with_the_pose_is_told_from_noise():
     q = joints(300, spread=1.0)
-    assert alike_by_chance(measured(q), pattern(2 * q) + noise(300), np.full(3, SIGMA_M)) < 1e-6
+    assert chance(q, pattern(2 * q) + noise(300)) < 1e-6
+
+
+def test_what_goes_with_a_single_joint_is_told_where_poses_are_alike_in_that_joint():
+    q = joints(300)
+    residual = SIGMA_M * np.sin(5 * q[:, [3]]) * np.ones(3) + noise(300)
+    sigma = np.full(3, SIGMA_M)
+    assert alike_by_chance(residual, sigma, [q[:, [3]]], []) < 1e-4
+    assert alike_by_chance(residual, sigma, [q], []) > 1e-3
 
 
 def test_what_goes_with_time_is_told_from_noise_though_poses_came_in_random_order():
     drift = 3.0 * SIGMA_M * np.sin(np.linspace(0, 20, 300))[:, None]
-    assert alike_by_chance(measured(joints(300)), drift + noise(300), np.full(3, SIGMA_M)) < 1e-6
+    assert chance(joints(300), drift + noise(300), time=True) < 1e-6
 
 
-def test_a_pattern_of_orientation_alone_is_seen():
-    q = joints(300, spread=1.0)
-    residual = np.concatenate([noise(300), pattern(2 * q) + noise(300, 2)], axis=1)
-    assert alike_by_chance(measured(q), residual, np.full(6, SIGMA_M)) < 1e-6
+def test_an_error_along_an_axis_that_turns_with_the_robot_is_seen_in_the_view_along_that_axis():
+    """Constant along an axis that points elsewhere at every pose: in the tracker's axes it looks like noise."""
+    axis = np.random.default_rng(5).normal(size=(300, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    residual = SIGMA_M * axis + noise(300)
+    assert chance(joints(300), residual, axis[:, :, None]) < 1e-6
+    assert chance(joints(300), residual) > 1e-3
 
 
-def test_two_gross_errors_side_by_side_make_no_pattern():
+def test_gross_errors_among_strangers_make_no_pattern():
     residual = noise(300)
-    residual[[100, 101]] = 1.0
-    q = joints(300)
-    q[101] = q[100] + 1e-4
-    assert alike_by_chance(measured(q), residual, np.full(3, SIGMA_M)) > 0.001
+    residual[[40, 100, 220]] = 1.0
+    assert chance(joints(300), residual, time=True) > 0.001
 
 
 def test_errors_that_go_against_those_of_their_neighbours_are_no_pattern_that_a_model_lacks():
     residual = 3.0 * SIGMA_M * (-1.0) ** np.arange(300)[:, None] + 0.1 * noise(300)
-    along = np.outer(np.linspace(0, 2, 300), np.ones(6))
-    assert alike_by_chance(measured(along), residual, np.full(3, SIGMA_M)) > 0.01
+    along = np.arange(300)[:, None]
+    one_step_on = alike_by_chance(residual, np.full(3, SIGMA_M), [along], [])
+    assert one_step_on > 0.01

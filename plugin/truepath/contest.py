@@ -8,14 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from truepath.effect_fit import fit_effects
-from truepath.effects import EFFECTS
-from truepath.effects.base import Effect, Term
+from truepath.effects import EFFECTS, motions
+from truepath.effects.base import Effect, Term, basis
 from truepath.search import Search, Trial
 
 LEAST_LOG_ODDS = 10.0  # for an effect: odds of 22,000 to 1, decisive by far (Kass, Raftery 1995)
 NAMED_SHARE = 0.5  # of the evidence for a nameless form that a named effect must reach to be above suspicion
 JOINT_SHARE = 0.8  # of it that all suspects together must reach
+SHADOW_SHARE = 0.25  # of the evidence for a nameless form in the model that a further name must reach
 MOST_ROUNDS = 16
+ALIKE = 0.6  # correlation
 WAVES, SIMPLE = ("transmission_error", "axis_wobble"), ("encoder_scale", "joint_compliance", "backlash")
 
 Progress = Callable[[str], None]
@@ -36,6 +38,8 @@ class Contest:
         suspects: names of effects under suspicion.
         gains: what each brought the last time it was tried. That hardly ever rises when another comes in, so
             those that brought little are tried again only when nothing else passes.
+        nameless_gain: the most that a nameless form in the model has brought. What little it leaves, because it
+            is not quite the right form, is not given a name.
     """
 
     search: Search
@@ -44,6 +48,7 @@ class Contest:
     progress: Progress
     suspects: set[str] = field(default_factory=set)
     gains: dict[str, float] = field(default_factory=dict)
+    nameless_gain: float = 0.0
     _fruitless: set[str] = field(default_factory=set)
 
     def run(self) -> None:
@@ -51,6 +56,8 @@ class Contest:
         for _ in range(MOST_ROUNDS):
             fresh: dict[str, Trial] = {}
             best = self._best_of(self.named, fresh, LEAST_LOG_ODDS) or self._best_of(self.named, fresh, -np.inf)
+            if best is not None and best.gain < SHADOW_SHARE * self.nameless_gain:
+                best = None
             if best is not None:
                 rival = self._best_of(self.nameless, fresh, best.gain / NAMED_SHARE)
                 if rival is not None:
@@ -58,12 +65,19 @@ class Contest:
             else:
                 best = self._best_of(self.nameless, fresh, LEAST_LOG_ODDS)
                 best = best or self._best_of(self.nameless, fresh, -np.inf)
+                self.nameless_gain = max(self.nameless_gain, 0.0 if best is None else best.gain)
             if best is None:
                 return
             self._take(best)
 
     def examine(self) -> bool:
         """Drops all suspects if a single nameless form explains more than they do together; True if so."""
+        for name in self.suspects:
+            own = [term for term in self.search.fit.terms if term.effect == name]
+            self.search.look(without=own)
+            if own and self.search.gain_of(own) < SHADOW_SHARE * self.nameless_gain:
+                self._fit([term for term in self.search.fit.terms if term.effect != name])
+        self.search.look()
         terms = self.search.fit.terms
         suspects = tuple(term for term in terms if term.effect in self.suspects)
         if not suspects:
@@ -77,6 +91,7 @@ class Contest:
             self.search.look()
             return False
         self._take(rival)
+        self.nameless_gain = max(self.nameless_gain, rival.gain)
         self.gains.clear()
         return True
 
@@ -88,7 +103,7 @@ class Contest:
         """
         simple = [effect for effect in self.named if effect.name in SIMPLE]
         for term in self.search.fit.terms:
-            if term.effect not in WAVES:
+            if term.effect not in WAVES or not self._may_be_simple(term, simple):
                 continue
             self.search.look(without=[term])
             own = self.search.gain_of([term])
@@ -101,6 +116,19 @@ class Contest:
                 self._fit(merged(others, [offer for offer in offers if offer.effect == best]))
             else:
                 self.search.look()
+
+    def _may_be_simple(self, term: Term, simple: Iterable[Effect]) -> bool:
+        """Whether its motion goes at all with what a simple effect of the same joint would do: quick to see."""
+        robot, seen = self.search.kinematic.problem.robot, self.search.seen
+        (part,) = (part for part in self.search.fit.effects if part.term is term)
+        motion = motions(robot, seen, part)
+        for effect in simple:
+            for offer in effect.terms(robot, seen):
+                if offer.joint == term.joint and offer.moves is term.moves:
+                    like = basis(effect, offer, robot, seen)[:, 0, 0]
+                    if abs(np.corrcoef(like, motion[:, 0])[0, 1]) > ALIKE:
+                        return True
+        return False
 
     def _best_of(self, effects: Iterable[Effect], fresh: dict[str, Trial], promise: float) -> Trial | None:
         """The best of those that brought more than ``promise`` the last time, if it passes."""
@@ -123,7 +151,8 @@ class Contest:
             self._fruitless.add(trial.name)  # it came and went: no use in trying it again and again
 
     def _fit(self, terms: Iterable[Term]) -> None:
-        self.search.fit = fit_effects(self.search.kinematic, self.search.context, tuple(terms))
+        search = self.search
+        search.fit = fit_effects(search.kinematic, search.context, tuple(terms), start=search.fit)
         self.search.look()
 
 

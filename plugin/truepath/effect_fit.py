@@ -98,7 +98,14 @@ def kinematic_prior(kinematic: RobustFit) -> Array:
     return np.minimum(kinematic.prior_sigma[kinematic.free], FRAME_PRIOR)
 
 
-def fit_effects(kinematic: RobustFit, context: Context, terms: Sequence[Term], *, prune: bool = True) -> EffectFit:
+def fit_effects(
+    kinematic: RobustFit,
+    context: Context,
+    terms: Sequence[Term],
+    *,
+    prune: bool = True,
+    start: EffectFit | None = None,
+) -> EffectFit:
     """Continues a kinematic fit with terms of effects; with none, only adds the evidence.
 
     Args:
@@ -106,12 +113,17 @@ def fit_effects(kinematic: RobustFit, context: Context, terms: Sequence[Term], *
         context: of all its poses.
         terms: what to fit.
         prune: drop groups and terms that the data does not speak for.
+        start: a fit with about the same terms, to go on from.
     """
-    inlier, sigma = _single_rows_apart(kinematic.solution.weights > 0), kinematic.sigma
     offered = TermSet.of(kinematic.problem.robot, context, terms)
     prior = kinematic_prior(kinematic)
     k = len(prior)
-    p, values, size = kinematic.p.copy(), np.zeros(len(offered)), offered.plausible
+    if start is None:
+        inlier, sigma = _single_rows_apart(kinematic.solution.weights > 0), kinematic.sigma
+        p, values, size = kinematic.p.copy(), np.zeros(len(offered)), offered.plausible
+    else:
+        inlier, sigma, p = start.inlier, start.sigma, start.p.copy()
+        values, size = _carried_over(start, offered)
     for _ in range(MAX_ROUNDS):
         near = linearise(kinematic.problem, kinematic.free, context, offered, p, values)
         A = np.concatenate([near.kinematics, near.effects], axis=2)
@@ -150,6 +162,24 @@ def fit_effects(kinematic: RobustFit, context: Context, terms: Sequence[Term], *
         log_odds={name: offered.log_odds(offered.of_effect(name), posterior, k) for name in offered.effects},
         log_evidence=posterior.log_evidence,
     )
+
+
+def _carried_over(start: EffectFit, offered: TermSet) -> tuple[Array, Array]:
+    """Values ``(K,)`` and sizes ``(groups,)`` of what an earlier fit has too; 0 and plausible for the rest."""
+    known = {}
+    for part in start.effects:
+        term = part.term
+        for parameter, value in zip(term.parameters, part.values, strict=True):
+            known[term.effect, term.moves, term.joint, term.constants, parameter.name] = value
+    sizes = dict(zip(known, start.prior_size, strict=True))
+    values, size = np.zeros(len(offered)), offered.plausible.copy()
+    names = ((t, p.name) for t in offered.terms for p in t.parameters)
+    for i, (term, name) in enumerate(names):
+        place = (term.effect, term.moves, term.joint, term.constants, name)
+        if place in known:
+            values[i] = known[place]
+            size[offered.group[i]] = sizes[place]
+    return values, size
 
 
 def _single_rows_apart(inlier: Array) -> Array:

@@ -65,7 +65,7 @@ def gather(kinematic: KinematicFit, visits: Array, progress: Progress = lambda _
     withdrawn = {confusion.withdrawn for confusion in confusions}
     named = tuple(term for term in named if term.effect not in withdrawn)
     return Evidence(
-        fit=fit_effects(kinematic.fit, context, named, prune=False),
+        fit=fit_effects(kinematic.fit, context, named, prune=False, start=fit),
         named=named,
         nameless=tuple(term for term in fit.terms if term.effect not in EFFECTS),
         p_values=p_values,
@@ -97,4 +97,4 @@ def _validated(
             terms = [term for term in fit.terms if term.effect != worst]
         else:
             terms = [term for t, term in enumerate(fit.terms) if str(t) != worst]
-        fit = fit_effects(kinematic.fit, kinematic.context, terms, prune=False)
+        fit = fit_effects(kinematic.fit, kinematic.context, terms, prune=False, start=fit)

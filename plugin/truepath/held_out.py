@@ -58,10 +58,12 @@ class CrossValidation:
             visits: ``(N,)`` number of the pose that a row visits: visits of one pose are left out together.
         """
         worst = dict.fromkeys(groups, 0.0)
+        A, y = self.A.reshape(-1, self.A.shape[2]), self.y.ravel()
+        whole = A.T @ A + np.diag(self.precision), A.T @ y
         for folds in (_random_folds(visits), _block_folds(len(self.y))):
             agreement, spread = dict.fromkeys(groups, 0.0), dict.fromkeys(groups, 0.0)
             for rows in folds:
-                for name, (predicted, left) in self._left_out(rows, groups).items():
+                for name, (predicted, left) in self._left_out(rows, groups, *whole).items():
                     agreement[name] += float(np.sum(predicted * left))
                     spread[name] += float(np.sum(predicted**2))
             for name in groups:
@@ -70,23 +72,20 @@ class CrossValidation:
                 worst[name] = max(worst[name], float(stats.norm.sf(z)))
         return worst
 
-    def _left_out(self, rows: Array, groups: Mapping[str, Array]) -> dict[str, tuple[Array, Array]]:
+    def _left_out(self, rows: Array, groups: Mapping[str, Array], H: Array, g: Array) -> dict[str, tuple[Array, Array]]:
         """By set of columns: its prediction for the rows left out, and what is left there without it."""
-        k = self.A.shape[2]
-        seen = np.ones(len(self.y), bool)
-        seen[rows] = False
-        A, y = self.A[seen].reshape(-1, k), self.y[seen].ravel()
-        H = A.T @ A + np.diag(self.precision)
+        A, y = self.A[rows].reshape(-1, self.A.shape[2]), self.y[rows].ravel()
+        H, g = H - A.T @ A, g - A.T @ y
         scale = np.diag(H) ** -0.5
         covariance = scale[:, None] * np.linalg.inv(scale[:, None] * H * scale) * scale
-        x = covariance @ (A.T @ y)
+        x = covariance @ g
         out = {}
         for name, own in groups.items():
             # The fit without these columns is the fit under the condition that they are zero.
             own_covariance = covariance[np.ix_(own, own)]
             change = covariance[:, own] @ np.linalg.solve(own_covariance, x[own])
-            predicted = self.A[rows] @ change
-            left = self.y[rows] - self.A[rows] @ (x - change)
+            predicted = A @ change
+            left = y - A @ (x - change)
             out[name] = predicted, left
         return out
 

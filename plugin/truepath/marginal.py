@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_solve
 
 from truepath.evidence import LinearProblem
 from truepath.lie import Array
@@ -22,33 +22,41 @@ class Marginal:
 
     Attributes:
         sigma: ``(m,)`` noise of the readings, m and rad.
-        Q: ``(N m, k)`` J R^-1, R the triangular factor of J and the prior.
+        J: ``(N m, k)`` whitened derivatives by the parameters, in units of ``scale``.
+        factor: Cholesky factor of J^T J and the prior.
         y: ``(N, m)`` whitened readings, projected.
+        spent: share of the readings that the parameters use up.
     """
 
     sigma: Array
-    Q: Array
+    J: Array
+    factor: Array
     y: Array
+    spent: float
 
     @classmethod
     def of(cls, y: Array, J: Array, prior_sigma: Array, sigma: Array) -> Marginal:
         """From readings ``(N, m)``, derivatives ``(N, m, k)``, prior widths ``(k,)`` and noise ``(m,)``."""
         rows = (J / sigma[:, None]).reshape(J.shape[0] * J.shape[1], J.shape[2])
-        R = np.linalg.qr(np.concatenate([rows, np.diag(1.0 / prior_sigma)]), mode="r")
-        Q = solve_triangular(R, rows.T, trans="T").T
+        H = rows.T @ rows
+        scale = (np.diag(H) + prior_sigma**-2.0) ** -0.5
+        H *= scale[:, None] * scale
+        factor = np.linalg.cholesky(H + np.diag((scale / prior_sigma) ** 2))
+        rows *= scale
         whitened = (y / sigma).ravel()
-        return cls(sigma, Q, (whitened - Q @ (Q.T @ whitened)).reshape(y.shape))
+        left = whitened - rows @ cho_solve((factor, True), rows.T @ whitened)
+        spent = float(np.trace(cho_solve((factor, True), H)))
+        return cls(sigma, rows, factor, left.reshape(y.shape), spent)
 
     def project(self, A: Array) -> Array:
         """``(N, m, K)`` columns in m and rad, whitened and without what the kinematics can imitate."""
         rows = (A / self.sigma[:, None]).reshape(A.shape[0] * A.shape[1], A.shape[2])
-        return (rows - self.Q @ (self.Q.T @ rows)).reshape(A.shape)
+        return (rows - self.J @ cho_solve((self.factor, True), self.J.T @ rows)).reshape(A.shape)
 
     def first(self, count: int) -> Marginal:
         """With only the first ``count`` parameters taken out; y stays as it is. To rank columns, and fast."""
-        return Marginal(self.sigma, self.Q[:, :count], self.y)
+        return Marginal(self.sigma, self.J[:, :count], self.factor[:count, :count], self.y, self.spent)
 
     def problem(self, projected: Array, y: Array | None = None) -> LinearProblem:
         """Of projected columns ``(N, m, K)``; noise is 1 per kind of reading."""
-        spent = float(np.sum(self.Q**2)) / (len(self.sigma) // 3)
-        return LinearProblem.of(projected, self.y if y is None else y, spent)
+        return LinearProblem.of(projected, self.y if y is None else y, self.spent / (len(self.sigma) // 3))

@@ -22,6 +22,8 @@ from truepath.robust_fit import RobustFit
 from truepath.term_set import TermSet
 
 WORTH_A_LOOK = 0.05  # probability of a group's score by chance, above which it is not even tried
+FEW_FORMS, MANY_GROUPS, MOST_PURSUED = 2, 60, 40
+LENIENT = 5.0
 INVISIBLE = 1e-6  # share of a column's square that must be left when the kinematics is taken out
 
 
@@ -116,17 +118,17 @@ class Search:
             chi2[group], dof[group] = float(np.sum(b**2 / values[good])), int(good.sum())
         return chi2, dof
 
-    def best_form(self, effect: Effect) -> list[Term]:
-        """The most promising of the effect's alternatives, searched coarsely, then finely."""
+    def best_forms(self, effect: Effect) -> list[list[Term]]:
+        """The most promising of the effect's alternatives, searched coarsely, then finely; all if they are few."""
         robot = self.kinematic.problem.robot
         forms = effect.alternatives(robot, self.seen)
         self.tried[effect.name] = len(forms) * max((len(form) for form in forms), default=1)
-        if len(forms) < 2:
-            return forms[0] if forms else []
+        if len(forms) <= FEW_FORMS:
+            return forms
         best = max(forms, key=self._promise)
         fine = effect.refined(best, robot, self.seen)
         self.tried[effect.name] += len(fine)
-        return max([best, *fine], key=self._promise)
+        return [max([best, *fine], key=self._promise)]
 
     def _promise(self, form: list[Term]) -> float:
         terms, columns = self.project(self.offered(form), self.rigid)
@@ -137,12 +139,23 @@ class Search:
 
     def trial(self, effect: Effect) -> Trial:
         """What an effect would bring."""
-        terms, columns = self.project(self.offered(self.best_form(effect)), self.marginal)
-        if not len(terms):
-            return Trial(effect.name)
-        chi2, dof = self.scores(terms, columns)
-        promising = (stats.chi2.sf(chi2, dof) < WORTH_A_LOOK)[terms.group]
-        terms, columns = terms.only(promising), columns[:, :, promising]
+        trials = [self._try(effect, form) for form in self.best_forms(effect)]
+        return max(trials, key=lambda trial: trial.gain, default=Trial(effect.name))
+
+    def _try(self, effect: Effect, form: list[Term]) -> Trial:
+        # A first look without the effects in the model taken out, which is quick; then a good one.
+        terms, columns = self.project(self.offered(form), self.rigid)
+        for leniency in (LENIENT, 1.0):
+            if leniency == 1.0:
+                terms, columns = self.project(terms, self.marginal)
+            if not len(terms):
+                return Trial(effect.name)
+            if len(terms.plausible) > MANY_GROUPS:
+                promising = self._pursued(terms, columns)
+            else:
+                chi2, dof = self.scores(terms, columns)
+                promising = stats.chi2.sf(chi2, dof) < leniency * WORTH_A_LOOK
+            terms, columns = terms.only(promising[terms.group]), columns[:, :, promising[terms.group]]
         problem, size = self.marginal.problem(columns), None
         while len(terms):
             posterior = self.infer(problem, terms, size)
@@ -166,6 +179,27 @@ class Search:
         good = values > 1e-9
         b = vectors[:, good].T @ (X.T @ self.left.ravel())
         return float(np.sum(b**2 / values[good])) - int(good.sum())
+
+    def _pursued(self, terms: TermSet, columns: Array) -> Array:
+        """``(groups,)`` True for those taken one after the other, the best first (orthogonal matching pursuit).
+
+        To tell the few large ones of many that resemble each other.
+        """
+        left, X = self.left.ravel().copy(), columns.reshape(self.left.size, -1).copy()
+        taken = np.zeros(len(terms.plausible), bool)
+        worth = 2.0 * np.log(left.size * len(taken))
+        for _ in range(MOST_PURSUED):
+            square, along = np.einsum("rk,rk->k", X, X), X.T @ left
+            single = np.bincount(terms.group, along**2 / np.maximum(square, 1e-9), len(taken))
+            best = int(np.argmax(single))
+            if single[best] < worth or taken[best]:
+                break
+            taken[best] = True
+            Q = np.linalg.qr(X[:, terms.group == best])[0]
+            left -= Q @ (Q.T @ left)
+            X -= Q @ (Q.T @ X)
+            X[:, terms.group == best] = 0.0
+        return taken
 
     def gain_of(self, terms: Iterable[Term]) -> float:
         """By how much the log evidence rises with stated terms."""

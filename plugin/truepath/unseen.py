@@ -35,14 +35,16 @@ class UnseenPoses:
         self, fit: KinematicFit, evidence: Evidence, measurements: Measurements, context: Context, unseen: Array
     ) -> None:
         self.fit, self.evidence, self.measurements, self.context = fit, evidence, measurements, context
-        self.kinematic, self.final = self.model(()), finish(fit, evidence.fit).model
+        self.kinematic = finish(fit, fit_effects(fit.fit, fit.context, ())).model
+        self.final = finish(fit, evidence.fit).model
         miss = np.linalg.norm(self.kinematic.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
         self.sane = miss <= GROSS * np.median(miss)
         self.unseen = unseen & self.sane
 
     def model(self, terms: tuple[Term, ...]) -> CalibratedModel:
-        """The kinematics with some terms."""
-        return finish(self.fit, fit_effects(self.fit.fit, self.fit.context, terms, prune=False)).model
+        """The kinematics with some of the findings' terms."""
+        found = fit_effects(self.fit.fit, self.fit.context, terms, prune=False, start=self.evidence.fit)
+        return finish(self.fit, found).model
 
     def predict(self, model: CalibratedModel | str) -> Array:
         """``(N, 4, 4)``."""

@@ -7,7 +7,7 @@ there is of which is learnt from the data, band by band.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import casadi as ca
 import numpy as np
@@ -20,9 +20,11 @@ from truepath.robot import NominalRobot
 HIGHEST_CYCLES_PER_TURN = 128.0
 BAND_EDGES = (0.0, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)  # cycles per turn; a band shares one size
 PLAUSIBLE_RAD = 1e-5
-FULL_TURN_RAD = np.radians(330.0)
+FULL_TURN = 330.0 / 360.0
 LEAST_RANGE_RAD = np.radians(5.0)
-POSES_PER_WAVE = 4  # at least: more waves than that and they are not told from each other
+POSES_PER_WAVE = 1.2  # at least: more waves than that and they are not told from each other
+
+Form = Callable[[float, float], tuple[EffectParameter, ...]]  # of the part of a turn, and of the most waves
 
 
 class TransmissionError(Effect):
@@ -39,13 +41,23 @@ class TransmissionError(Effect):
     remedy = "keep the correction table of this joint; have the gear looked at if the error is out of the usual"
 
     def alternatives(self, robot: NominalRobot, context: Context) -> list[list[Term]]:
+        """Bands, whose waves share a size: many small waves; and single lines: a few large ones.
+
+        A line has a whole number of cycles per turn also where only a part of a turn was measured.
+        """
+        return [self._form(robot, context, form) for form in (_bands, _lines)]
+
+    def _form(self, robot: NominalRobot, context: Context, form: Form) -> list[Term]:
         terms = []
         for joint in range(1, robot.num_joints + 1):
             theta = context.q_rad[:, joint - 1]
             if np.ptp(theta) >= LEAST_RANGE_RAD:
-                waves = _waves(float(np.ptp(theta)), len(np.unique(np.round(theta, 5))))
-                terms.append(Term(self.name, Moves.JOINT, joint, ("theta",), covered(context, joint), waves))
-        return [terms]
+                turns = float(np.ptp(theta)) / (2 * np.pi)
+                most = min(HIGHEST_CYCLES_PER_TURN * turns, len(np.unique(np.round(theta, 5))) / POSES_PER_WAVE)
+                terms.append(
+                    Term(self.name, Moves.JOINT, joint, ("theta",), covered(context, joint), form(turns, most))
+                )
+        return terms
 
     def motion(self, term: Term, reading: Mapping[str, ca.SX], parameters: ca.SX) -> ca.SX:
         theta, waves = reading["theta"], []
@@ -59,19 +71,27 @@ class TransmissionError(Effect):
         return ca.dot(parameters, ca.vertcat(*waves))
 
 
-def _waves(span: float, different_angles: int) -> tuple[EffectParameter, ...]:
-    turns = span / (2 * np.pi)
-    waves = min(HIGHEST_CYCLES_PER_TURN * turns, different_angles / POSES_PER_WAVE)
-    if span >= FULL_TURN_RAD:
-        cycles = range(1, int(waves / max(turns, 1.0)) + 1)
-        return tuple(_parameter(f"{kind} {k}", k) for k in cycles for kind in ("cos", "sin"))
-    return tuple(_parameter(f"half-wave {m}", 0.5 * m / turns) for m in range(1, int(2 * waves) + 1))
+def _bands(turns: float, most: float) -> tuple[EffectParameter, ...]:
+    """Waves that fit the range, at most so many."""
+    if turns >= FULL_TURN:
+        named = [
+            (f"{kind} {k}", float(k)) for k in range(1, int(most / max(turns, 1.0)) + 1) for kind in ("cos", "sin")
+        ]
+    else:
+        named = [(f"half-wave {m}", 0.5 * m / turns) for m in range(1, int(2 * most) + 1)]
+    band = [int(np.searchsorted(BAND_EDGES, cycles)) - 1 for _, cycles in named]
+    return tuple(
+        EffectParameter(name, "rad", PLAUSIBLE_RAD, f"{BAND_EDGES[b]:g} to {BAND_EDGES[b + 1]:g} cycles per turn")
+        for (name, _), b in zip(named, band, strict=True)
+    )
 
 
-def _parameter(name: str, cycles_per_turn: float) -> EffectParameter:
-    band = int(np.searchsorted(BAND_EDGES, cycles_per_turn)) - 1
-    label = f"{BAND_EDGES[band]:g} to {BAND_EDGES[band + 1]:g} cycles per turn"
-    return EffectParameter(name, "rad", PLAUSIBLE_RAD, label)
+def _lines(turns: float, most: float) -> tuple[EffectParameter, ...]:
+    return tuple(
+        EffectParameter(f"{kind} {k}", "rad", PLAUSIBLE_RAD, f"{k} cycles per turn")
+        for k in range(1, int(most / min(turns, 1.0)) + 1)
+        for kind in ("cos", "sin")
+    )
 
 
 EFFECT = TransmissionError()
