@@ -1,5 +1,7 @@
 """What is known about poses besides their joints, and what is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from truepath.context import RECORDED, Context, as_context
@@ -59,7 +61,8 @@ def test_the_clock_is_the_recorded_time_or_else_the_order_of_measurement(measure
 
 @pytest.mark.parametrize("rows", [np.array([3, 0, 7]), np.arange(POSES) % 3 == 0], ids=["numbers", "mask"])
 def test_some_poses_keep_their_own_circumstances(measurements, rows):
-    whole = Context.of(measurements)
+    turned = np.broadcast_to(np.eye(3), (POSES, 3, 3)) * np.arange(1, POSES + 1)[:, None, None]
+    whole = replace(Context.of(measurements), R_MF=turned)
     some = whole.subset(rows)
     for name in ("q_rad", "payload_kg", *RECORDED):
         np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[rows])

@@ -122,9 +122,11 @@ def _equals(search: Search, name: str, terms: tuple[Term, ...]) -> Confusion | N
     for other in COMPACT:
         if not EFFECTS[other].missing(search.seen) and (other == name or other not in {t.effect for t in terms}):
             trials[other] = search.trial(EFFECTS[other])
-    search.look()
     gain = trials[name].gain
-    rivals = [other for other, trial in trials.items() if other != name and trial.gain > gain - CLOSE_ODDS]
+    close = [trial for trial in trials.values() if trial.name != name and trial.gain > gain - CLOSE_ODDS]
+    # Two causes that both add to the model are no rivals.
+    rivals = [t.name for t in close if search.gain_of((*own, *t.terms)) < max(t.gain, gain) + LEAST_LOG_ODDS]
+    search.look()
     if gain < LEAST_LOG_ODDS or not rivals:
         return None
     best = max(trials.values(), key=lambda trial: trial.gain)

@@ -18,6 +18,7 @@ JOINT_SHARE = 0.8  # of it that all suspects together must reach
 SHADOW_SHARE = 0.25  # of the evidence for a nameless form in the model that a further name must reach
 MOST_ROUNDS = 16
 ALIKE = 0.6  # correlation
+QUIETER = 0.95
 WAVES, SIMPLE = ("transmission_error", "axis_wobble"), ("encoder_scale", "joint_compliance", "backlash")
 
 Progress = Callable[[str], None]
@@ -36,8 +37,8 @@ class Contest:
         named, nameless: who takes part.
         progress: told what is being tried.
         suspects: names of effects under suspicion.
-        gains: what each brought the last time it was tried. That hardly ever rises when another comes in, so
-            those that brought little are tried again only when nothing else passes.
+        gains: what each brought the last time it was tried. At the same noise that hardly ever rises when another
+            comes in, so those that brought little are tried again only when nothing else passes.
         nameless_gain: the most that a nameless form in the model has brought. What little it leaves, because it
             is not quite the right form, is not given a name.
     """
@@ -151,9 +152,11 @@ class Contest:
             self._fruitless.add(trial.name)  # it came and went: no use in trying it again and again
 
     def _fit(self, terms: Iterable[Term]) -> None:
-        search = self.search
+        search, noise = self.search, self.search.fit.sigma[0]
         search.fit = fit_effects(search.kinematic, search.context, tuple(terms), start=search.fit)
         self.search.look()
+        if search.fit.sigma[0] < QUIETER * noise:
+            self.gains.clear()  # what was lost in the noise may stand out now
 
 
 def _places(terms: Iterable[Term]) -> list[tuple]:

@@ -74,10 +74,27 @@ def test_waves_over_part_of_a_turn_are_half_waves_that_fit_it(ur5):
 
 
 @pytest.mark.parametrize("poses", [60, 200, 1000])
-def test_there_are_two_poses_or_more_for_every_wave_that_is_offered(ur5, poses):
+def test_there_are_more_readings_than_waves_that_are_offered_whatever_the_form(ur5, poses):
     q = np.random.default_rng(1).uniform(-3, 3, (poses, 6))
-    for term in EFFECTS["transmission_error"].terms(ur5, Context(q)):
-        assert 0 < len(term.parameters) <= poses / 2
+    for form in EFFECTS["transmission_error"].alternatives(ur5, Context(q)):
+        assert form
+        for term in form:
+            assert 0 < len(term.parameters) < 2 * poses
+
+
+def test_every_wave_of_every_form_is_the_one_that_its_name_says(ur5):
+    """Joint 1 over a full turn, joint 2 over part of one."""
+    q = np.random.default_rng(1).uniform([-3.1, 0.2, 0, 0, 0, 0], [3.1, 1.4, 1, 1, 1, 1], (100, 6))
+    for form in EFFECTS["transmission_error"].alternatives(ur5, Context(q)):
+        for term in form[:2]:
+            theta = q[:, term.joint - 1]
+            share = (theta - theta.min()) / np.ptp(theta)
+            found = basis(EFFECTS["transmission_error"], term, ur5, Context(q))[:, 0]
+            for j, parameter in enumerate(term.parameters):
+                kind, order = parameter.name.split(" ")
+                waves = {"cos": np.cos(int(order) * theta), "sin": np.sin(int(order) * theta)}
+                expected = waves.get(kind, np.cos(np.pi * int(order) * share))
+                np.testing.assert_allclose(found[:, j], expected, atol=1e-11)
 
 
 def test_with_many_poses_tens_of_cycles_a_turn_are_offered(ur5):
