@@ -108,8 +108,7 @@ class Contest:
                 continue
             self.search.look(without=[term])
             own = self.search.gain_of([term])
-            robot, seen = self.search.kinematic.problem.robot, self.search.seen
-            offers = [t for effect in simple for t in effect.terms(robot, seen) if t.joint == term.joint]
+            offers = [t for t in self._simple_terms(simple) if t.joint == term.joint]
             gains = {offer.effect: self.search.gain_of([offer]) for offer in offers}
             best = max(gains, key=lambda name: gains[name], default="")
             if best and gains[best] > own:
@@ -123,13 +122,15 @@ class Contest:
         robot, seen = self.search.kinematic.problem.robot, self.search.seen
         (part,) = (part for part in self.search.fit.effects if part.term is term)
         motion = motions(robot, seen, part)
-        for effect in simple:
-            for offer in effect.terms(robot, seen):
-                if offer.joint == term.joint and offer.moves is term.moves:
-                    like = basis(effect, offer, robot, seen)[:, 0, 0]
-                    if abs(np.corrcoef(like, motion[:, 0])[0, 1]) > ALIKE:
-                        return True
+        for offer in self._simple_terms(simple):
+            if offer.joint == term.joint and offer.moves is term.moves:
+                like = basis(EFFECTS[offer.effect], offer, robot, seen)[:, 0, 0]
+                if abs(np.corrcoef(like, motion[:, 0])[0, 1]) > ALIKE:
+                    return True
         return False
+
+    def _simple_terms(self, simple: Iterable[Effect]) -> list[Term]:
+        return [term for effect in simple for form in self.search.forms_of(effect) for term in form.terms]
 
     def _best_of(self, effects: Iterable[Effect], fresh: dict[str, Trial], promise: float) -> Trial | None:
         """The best of those that brought more than ``promise`` the last time, if it passes."""

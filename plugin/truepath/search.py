@@ -46,7 +46,8 @@ class Search:
         fit: the present model.
         tried: hypotheses so far, by effect.
         present: its terms but for those left to be found anew.
-        seen: context of the rows that count.
+        origin: context of the rows that counted in the beginning: what effects are offered by.
+        rows, seen: numbers of the rows that count now, and their context.
         chain: where everything is, for these.
         marginal: their readings, with the kinematics and the present terms taken out.
     """
@@ -57,16 +58,18 @@ class Search:
     tried: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self._forms: dict[str, list[TermSet]] = {}
+        self._robot = self.kinematic.problem.robot
+        self.origin = self.context.subset(self.fit.inlier)
         self.look()
 
     def look(self, without: Iterable[Term] = ()) -> None:
         """Linearises about the present model; some of its terms can be left to be found anew."""
         rows = np.flatnonzero(self.fit.inlier)
-        robot = self.kinematic.problem.robot
-        chosen = TermSet.of(robot, self.context, self.fit.terms)
+        chosen = self.of_all(self.fit.terms)
         problem, free = self.kinematic.problem, self.kinematic.free
         near = linearise(problem, free, self.context, chosen, self.fit.p, self.fit.values)
-        self.seen, self.chain = self.context.subset(rows), near.chain.subset(rows)
+        self.rows, self.seen, self.chain = rows, self.context.subset(rows), near.chain.subset(rows)
         self.by_kinematics, self.kinematic_prior = near.kinematics[rows], kinematic_prior(self.kinematic)
         absent = tuple(without)
         self.present = tuple(term for term in self.fit.terms if term not in absent)
@@ -78,22 +81,31 @@ class Search:
         self.rigid = self.marginal.first(len(self.kinematic_prior))
         self.left = self.marginal.y
         nothing = self.marginal.problem(np.zeros((*self.left.shape, 0)))
-        self.base = self.infer(nothing, TermSet.of(robot, self.seen, ()))
+        self.base = self.infer(nothing, TermSet.of(self._robot, self.seen, ()))
 
     def infer(self, problem: LinearProblem, terms: TermSet, size: Array | None = None) -> Posterior:
         """Sizes and noise for projected columns of some terms."""
         return infer(problem, terms.group, terms.plausible, np.ones(len(terms)), [1.0] * len(problem.count), size)
 
-    def offered(self, terms: list[Term]) -> TermSet:
-        """Those parameters of the terms that are not in the model yet."""
+    def offered(self, terms: TermSet) -> TermSet:
+        """Those parameters of terms for all poses that are not in the model yet, for the poses that count."""
         present = {(t.effect, t.joint, t.moves, t.constants): {p.name for p in t.parameters} for t in self.present}
-        new = []
-        for term in terms:
+        keep = []
+        for term in terms.terms:
             have = present.get((term.effect, term.joint, term.moves, term.constants), set())
-            parameters = tuple(p for p in term.parameters if p.name not in have)
-            if parameters:
-                new.append(term.with_parameters(parameters))
-        return TermSet.of(self.kinematic.problem.robot, self.seen, new)
+            keep += [parameter.name not in have for parameter in term.parameters]
+        new = terms if all(keep) else terms.only(np.array(keep, bool))
+        return new.rows(self.rows)
+
+    def forms_of(self, effect: Effect) -> list[TermSet]:
+        """The effect's alternatives, for all poses; the same all through the search."""
+        if effect.name not in self._forms:
+            self._forms[effect.name] = [self.of_all(form) for form in effect.alternatives(self._robot, self.origin)]
+        return self._forms[effect.name]
+
+    def of_all(self, terms: Iterable[Term]) -> TermSet:
+        """Terms for all poses, whether they count or not."""
+        return TermSet.of(self._robot, self.context, tuple(terms))
 
     def project(self, terms: TermSet, marginal: Marginal) -> tuple[TermSet, Array]:
         """The columns of terms, those left out that the kinematics imitates."""
@@ -118,19 +130,18 @@ class Search:
             chi2[group], dof[group] = float(np.sum(b**2 / values[good])), int(good.sum())
         return chi2, dof
 
-    def best_forms(self, effect: Effect) -> list[list[Term]]:
+    def best_forms(self, effect: Effect) -> list[TermSet]:
         """The most promising of the effect's alternatives, searched coarsely, then finely; all if they are few."""
-        robot = self.kinematic.problem.robot
-        forms = effect.alternatives(robot, self.seen)
-        self.tried[effect.name] = len(forms) * max((len(form) for form in forms), default=1)
+        forms = self.forms_of(effect)
+        self.tried[effect.name] = len(forms) * max((len(form.terms) for form in forms), default=1)
         if len(forms) <= FEW_FORMS:
             return forms
         best = max(forms, key=self._promise)
-        fine = effect.refined(best, robot, self.seen)
+        fine = [self.of_all(form) for form in effect.refined([*best.terms], self._robot, self.origin)]
         self.tried[effect.name] += len(fine)
         return [max([best, *fine], key=self._promise)]
 
-    def _promise(self, form: list[Term]) -> float:
+    def _promise(self, form: TermSet) -> float:
         terms, columns = self.project(self.offered(form), self.rigid)
         if not len(terms):
             return 0.0
@@ -142,7 +153,7 @@ class Search:
         trials = [self._try(effect, form) for form in self.best_forms(effect)]
         return max(trials, key=lambda trial: trial.gain, default=Trial(effect.name))
 
-    def _try(self, effect: Effect, form: list[Term]) -> Trial:
+    def _try(self, effect: Effect, form: TermSet) -> Trial:
         # A first look without the effects in the model taken out, which is quick; then a good one.
         terms, columns = self.project(self.offered(form), self.rigid)
         for leniency in (LENIENT, 1.0):
@@ -170,7 +181,7 @@ class Search:
 
     def explained(self, terms: Iterable[Term]) -> float:
         """Chi-square that stated terms explain of what is left, less the number of their parameters."""
-        own, columns = self.project(TermSet.of(self.kinematic.problem.robot, self.seen, tuple(terms)), self.marginal)
+        own, columns = self.project(self.of_all(terms).rows(self.rows), self.marginal)
         if not len(own):
             return 0.0
         X = columns.reshape(self.left.size, -1)
@@ -203,7 +214,7 @@ class Search:
 
     def gain_of(self, terms: Iterable[Term]) -> float:
         """By how much the log evidence rises with stated terms."""
-        wanted, columns = self.project(self.offered(list(terms)), self.marginal)
+        wanted, columns = self.project(self.offered(self.of_all(terms)), self.marginal)
         if not len(wanted):
             return -np.inf
         return float(self.infer(self.marginal.problem(columns), wanted).log_evidence - self.base.log_evidence)
