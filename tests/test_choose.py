@@ -1,6 +1,10 @@
 """Which causes are chosen: those that are there, all of them, and none where there is none. Drake hides the truth."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -160,6 +164,33 @@ def test_every_place_and_moment_that_was_tried_counts_as_a_hypothesis(real_ur5, 
     assert tried("encoder_scale", "thermal_expansion") == 7
     assert tried("tool_shift") > 48
     assert tried() == 0
+
+
+CHOICE_OF_A_PROCESS = """
+from threadpoolctl import threadpool_limits
+from truepath.calibrate import fit_kinematics
+from truepath.choose import choose
+from truepath.virtual.real_robot import RealRobot
+from hidden import Hidden, both, wavy
+from test_choose import joint_by_joint, places
+
+real = RealRobot("ur5", 21)
+with threadpool_limits(1):
+    kinematic = fit_kinematics(real.robot, Hidden(real, both(wavy(5, 3e-4, 4), joint_by_joint)).measured(250, 13))
+    choice = choose(kinematic.fit, kinematic.context)
+print(sorted(places(choice.named)), sorted(places(choice.nameless)), choice.hypotheses)
+"""
+
+
+def test_the_choice_is_the_same_however_python_orders_its_sets():
+    """The order of a set of names differs from process to process."""
+    paths = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    choices = set()
+    for seed in ("0", "1"):
+        environment = {**os.environ, "PYTHONPATH": paths, "PYTHONHASHSEED": seed}
+        command = [sys.executable, "-c", CHOICE_OF_A_PROCESS]
+        choices.add(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert len(choices) == 1, choices
 
 
 def test_a_context_without_circumstances_is_enough_to_choose_by(real_ur5):

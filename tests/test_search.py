@@ -78,9 +78,13 @@ def test_a_term_in_the_model_can_be_left_to_be_found_anew(softened):
 
 def test_parameters_that_are_in_the_model_already_are_not_offered_again(search, real_ur5):
     terms = EFFECTS["transmission_error"].terms(real_ur5.robot, search.seen)
-    assert {term.joint for term in search.offered(terms).terms} == {1, 2, 3, 4, 5, 6}
+
+    def offered(model, *some):
+        return model.offered(model.of_all(some))
+
+    assert {term.joint for term in offered(search, *terms).terms} == {1, 2, 3, 4, 5, 6}
     few = terms[0].with_parameters(terms[0].parameters[:4])
     fit = fit_effects(search.kinematic, search.context, [few], prune=False)
     later = Search(search.kinematic, search.context, fit)
-    assert later.offered([terms[0]]).terms[0].parameters == terms[0].parameters[4:]
-    assert len(later.offered([few])) == 0
+    assert offered(later, terms[0]).terms[0].parameters == terms[0].parameters[4:]
+    assert len(offered(later, few)) == 0
