@@ -249,7 +249,13 @@ def test_a_payload_that_nobody_can_carry_is_refused(with_effect, payload):
 
 def test_a_calibration_carries_another_payload_on_request_and_nothing_else_changes(with_effect, real_ur5):
     soft = part(
-        "joint_compliance", "joint", 2, ["gravity_torque"], {"lower_rad": -3.0, "upper_rad": 3.0}, ["compliance"]
+        "joint_compliance",
+        "joint",
+        2,
+        ["gravity_torque"],
+        {"lower_rad": -3.0, "upper_rad": 3.0},
+        ["compliance"],
+        "rad/(N m)",
     )
     calibration = load_calibration(with_effect(soft))
     q = np.array([[0.0, -1.0, 1.0, 0.0, 0.0, 0.0]])

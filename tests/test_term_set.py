@@ -88,9 +88,7 @@ def test_left_out_parameters_take_their_terms_along_when_none_is_left(whole, cha
     assert len(fewer) == keep.sum()
     np.testing.assert_array_equal(fewer.columns(chain, 3), whole.columns(chain, 3)[:, :, keep])
     assert [p.name for term in fewer.terms for p in term.parameters] == [
-        p.name
-        for p, kept in zip((p for term in whole.terms for p in term.parameters), keep, strict=True)
-        if kept
+        p.name for p, kept in zip((p for term in whole.terms for p in term.parameters), keep, strict=True) if kept
     ]
 
 

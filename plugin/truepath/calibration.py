@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -86,8 +87,11 @@ class Calibration(Part):
         """For a program with another payload on the flange than there was during the measurements; None: the same."""
         if payload_kg is None:
             return self
-        data = self.data.model_copy(update={"payload_kg": payload_kg})
-        return Calibration.model_validate({**dict(self), "schema": SCHEMA, "data": data})
+        if not (math.isfinite(payload_kg) and payload_kg >= 0):
+            raise InputError("this is no payload", expected="0 kg or more", found=str(payload_kg))
+        content = self.model_dump(by_alias=True)
+        content["data"]["payload_kg"] = payload_kg
+        return Calibration.model_validate(content)
 
     def to_json(self) -> str:
         """Text of the file: indented JSON that ends with a checksum over all that stands before it."""

@@ -185,10 +185,8 @@ class EffectPart(Part):
             raise ValueError(f"this truepath knows no effect {self.name!r}")
         if self.moves not in {kind.value for kind in Moves}:
             raise ValueError(f"nothing called {self.moves!r} can be moved by an effect")
-        if not self.constants.get("lower_rad", -1.0) < self.constants.get("upper_rad", 1.0):
-            raise ValueError("lower_rad is not below upper_rad")
         if not is_understood(self.fitted().term):
-            raise ValueError(f"effect {self.name!r} has parameters that this truepath does not know")
+            raise ValueError(f"effect {self.name!r} is not built in a way that this truepath knows")
         return self
 
     def fitted(self) -> FittedTerm:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from truepath.measurements import Measurements
     from truepath.robot import NominalRobot
 
+RESULTS = ("calibration.json", "report.html", "diagnosis.json")
 MOVED = 10.0  # times the error on held-out poses: that is no calibration that aged
 
 
@@ -77,7 +78,7 @@ def diagnose(
     """Show what the simulation gets wrong, name the cause, extend the model, measure the gain."""
     from truepath import console
     from truepath.diagnose import diagnose as find_causes
-    from truepath.pipeline import naming, write_diagnosis
+    from truepath.pipeline import naming, require_folder, write_diagnosis
 
     with console.progress("diagnosing") as say:
         say("reading the robot")
@@ -85,6 +86,7 @@ def diagnose(
         say("reading the data")
         measurements = _read(data, nominal, format, measured_in, probe)
         with naming(data):
+            require_folder(folder, [folder / name for name in RESULTS], data)
             diagnosis = find_causes(nominal, measurements, spec=robot, source=robot, progress=say)
         say("writing the report")
         files = write_diagnosis(diagnosis, folder, data)

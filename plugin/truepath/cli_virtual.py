@@ -24,6 +24,13 @@ def simulate(
     ] = False,
     seed: Annotated[int, typer.Option(help="of the robot's hidden errors")] = 0,
     poses_seed: Annotated[int, typer.Option(help="of poses and noise")] = 0,
+    hide: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="hide causes besides frame errors, comma-separated or one by one: transmission_error, "
+            "joint_compliance, backlash, frame_drift, tool_shift"
+        ),
+    ] = None,
     truth: Annotated[Path | None, typer.Option(help="also write what was hidden")] = None,
 ) -> None:
     """Make measured data of a virtual robot with hidden errors; the truth is computed by Drake."""
@@ -33,7 +40,9 @@ def simulate(
 
     campaign = Campaign(poses, noise_mm, orientation_noise_mrad, repeats, tracker, poses_seed)
     with console.progress("simulating"):
-        rows = simulate_campaign(robot, seed, campaign, output, truth)
+        rows = simulate_campaign(
+            robot, seed, campaign, output, truth, [name.strip() for text in hide or () for name in text.split(",")]
+        )
     console.out.print(f"{rows} measurements written to {output}")
 
 

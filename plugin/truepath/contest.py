@@ -15,7 +15,8 @@ from truepath.search import Search, Trial
 LEAST_LOG_ODDS = 10.0  # for an effect: odds of 22,000 to 1, decisive by far (Kass, Raftery 1995)
 NAMED_SHARE = 0.5  # of the evidence for a nameless form that a named effect must reach to be above suspicion
 JOINT_SHARE = 0.8  # of it that all suspects together must reach
-SHADOW_SHARE = 0.25  # of the evidence for a nameless form in the model that a further name must reach
+SHADOW_SHARE = 0.25  # of the evidence for a nameless form in the model that a further name must reach,
+FAR_SHADOW_SHARE = 0.05  # and one of a joint that the form has nothing to do with
 MOST_ROUNDS = 16
 ALIKE = 0.6  # correlation
 QUIETER = 0.95
@@ -57,7 +58,7 @@ class Contest:
         for _ in range(MOST_ROUNDS):
             fresh: dict[str, Trial] = {}
             best = self._best_of(self.named, fresh, LEAST_LOG_ODDS) or self._best_of(self.named, fresh, -np.inf)
-            if best is not None and best.gain < SHADOW_SHARE * self.nameless_gain:
+            if best is not None and self._is_shadow(best.gain, best.terms):
                 best = None
             if best is not None:
                 rival = self._best_of(self.nameless, fresh, best.gain / NAMED_SHARE)
@@ -73,10 +74,10 @@ class Contest:
 
     def examine(self) -> bool:
         """Drops all suspects if a single nameless form explains more than they do together; True if so."""
-        for name in self.suspects:
+        for name in sorted(self.suspects):
             own = [term for term in self.search.fit.terms if term.effect == name]
             self.search.look(without=own)
-            if own and self.search.gain_of(own) < SHADOW_SHARE * self.nameless_gain:
+            if own and self._is_shadow(self.search.gain_of(own), own):
                 self._fit([term for term in self.search.fit.terms if term.effect != name])
         self.search.look()
         terms = self.search.fit.terms
@@ -95,6 +96,12 @@ class Contest:
         self.nameless_gain = max(self.nameless_gain, rival.gain)
         self.gains.clear()
         return True
+
+    def _is_shadow(self, gain: float, terms: Iterable[Term]) -> bool:
+        """Whether so little is likely to be what a nameless form in the model leaves, not being quite the right one."""
+        elsewhere = {t.joint for t in self.search.fit.terms if t.effect not in EFFECTS}
+        near = None in elsewhere or any(term.joint in elsewhere for term in terms)
+        return gain < (SHADOW_SHARE if near else FAR_SHADOW_SHARE) * self.nameless_gain
 
     def simplify(self) -> None:
         """Waves that a cause with a single number explains as well give way to it.
@@ -135,7 +142,7 @@ class Contest:
     def _best_of(self, effects: Iterable[Effect], fresh: dict[str, Trial], promise: float) -> Trial | None:
         """The best of those that brought more than ``promise`` the last time, if it passes."""
         able = {effect.name: effect for effect in effects if effect.name not in self._fruitless}
-        while stale := {name for name in able if name not in fresh}:
+        while stale := [name for name in able if name not in fresh]:
             name = max(stale, key=lambda name: self.gains.get(name, np.inf))
             top = max((trial.gain for trial in fresh.values() if trial.name in able), default=-np.inf)
             if self.gains.get(name, np.inf) < max(top, promise):

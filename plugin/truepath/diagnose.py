@@ -11,10 +11,11 @@ from threadpoolctl import threadpool_limits
 
 from truepath.calibrate import Fit, KinematicFit, finish, fit_kinematics
 from truepath.calibration_parts import HeldOutPart
+from truepath.choose import choose
 from truepath.context import Context
 from truepath.describe import describe, held_out
 from truepath.diagnosis import Ambiguity, Diagnosis, Finding, FoundParameter, Stage, Unexplained
-from truepath.effect_fit import fit_effects
+from truepath.effect_fit import EffectFit, fit_effects
 from truepath.effects import EFFECTS
 from truepath.errors import CalibrationError
 from truepath.findings import Evidence, gather
@@ -29,7 +30,8 @@ from truepath.unseen import UnseenPoses
 from truepath.verdict import not_testable, verdict
 
 PARTS = 5  # one of them is kept away from fit and choice
-ENOUGH_POSES = 1600  # to see what is there; more only takes longer
+ENOUGH_POSES = 1600  # to see what is there, 1000 with orientations; more only takes longer
+ENOUGH_WITH_ORIENTATION = 1000
 
 Progress = Callable[[str], None]
 
@@ -62,7 +64,8 @@ def diagnose(
     unseen[measurements.folds(PARTS)[0]] = True
     progress("fitting the kinematics")
     try:
-        looked_at = _some(np.flatnonzero(~unseen), ENOUGH_POSES)
+        enough = ENOUGH_WITH_ORIENTATION if measurements.has_orientation else ENOUGH_POSES
+        looked_at = _some(np.flatnonzero(~unseen), enough)
         kinematic = fit_kinematics(robot, measurements.subset(looked_at), context.subset(looked_at))
         context = replace(context, R_MF=_flange_seen(kinematic, context))
         kinematic = replace(kinematic, context=context.subset(looked_at))
@@ -79,7 +82,7 @@ def diagnose(
     findings = _findings(trial, evidence)
     progress(f"fitting all {len(measurements)} poses")
     whole = fit_kinematics(robot, measurements, context)
-    fit = finish(whole, fit_effects(whole.fit, context, evidence.named))
+    fit = finish(whole, _extended(whole, evidence))
     verification: HeldOutPart | None
     if fit.model.effects:
         how = "a fifth of the poses, drawn at random, kept away from fit and choice of effects"
@@ -104,6 +107,19 @@ def diagnose(
         joint_view={name: trial.joint_view(name) for name in ("kinematic", "final")},
     )
     return replace(diagnosis, verdict=verdict(diagnosis))
+
+
+def _extended(whole: KinematicFit, evidence: Evidence) -> EffectFit:
+    """All poses with what was found: the same effects at the same places, their waves and moments chosen anew."""
+    if len(whole.measurements) > ENOUGH_POSES or not evidence.named:
+        return fit_effects(whole.fit, whole.context, evidence.named)
+    names = dict.fromkeys(term.effect for term in evidence.named)
+    found = choose(whole.fit, whole.context, names, nameless=False).fit
+    proved = {(term.effect, term.joint) for term in evidence.named}
+    terms = tuple(term for term in found.terms if (term.effect, term.joint) in proved)
+    if {(term.effect, term.joint) for term in terms} != proved:
+        return fit_effects(whole.fit, whole.context, evidence.named)
+    return fit_effects(whole.fit, whole.context, terms, prune=False, start=found)
 
 
 def _findings(trial: UnseenPoses, evidence: Evidence) -> tuple[Finding, ...]:

@@ -105,6 +105,7 @@ def fit_effects(
     *,
     prune: bool = True,
     start: EffectFit | None = None,
+    together: bool = False,
 ) -> EffectFit:
     """Continues a kinematic fit with terms of effects; with none, only adds the evidence.
 
@@ -114,12 +115,15 @@ def fit_effects(
         terms: what to fit.
         prune: drop groups and terms that the data does not speak for.
         start: a fit with about the same terms, to go on from.
+        together: let rows that were left out together take part again, to see what they can be told by.
     """
     offered = TermSet.of(kinematic.problem.robot, context, terms)
     prior = kinematic_prior(kinematic)
     k = len(prior)
     if start is None:
-        inlier, sigma = _single_rows_apart(kinematic.solution.weights > 0), kinematic.sigma
+        inlier, sigma = kinematic.solution.weights > 0, kinematic.sigma
+        if together:
+            inlier = single_rows_apart(inlier)
         p, values, size = kinematic.p.copy(), np.zeros(len(offered)), offered.plausible
     else:
         inlier, sigma, p = start.inlier, start.sigma, start.p.copy()
@@ -182,7 +186,7 @@ def _carried_over(start: EffectFit, offered: TermSet) -> tuple[Array, Array]:
     return values, size
 
 
-def _single_rows_apart(inlier: Array) -> Array:
+def single_rows_apart(inlier: Array) -> Array:
     """``(N,)`` where only rows that stand alone stay left out.
 
     A beam is broken for a row or two. Where most rows of a stretch do not fit, something has moved, and they are

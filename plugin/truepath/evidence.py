@@ -7,6 +7,7 @@ that hundreds of waves can be offered and only the real ones are taken.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,10 +39,10 @@ class LinearProblem:
     count: list[float]
 
     @classmethod
-    def of(cls, A: Array, y: Array, spent: float = 0.0) -> LinearProblem:
+    def of(cls, A: Array, y: Array, spent: Sequence[float] = (0.0, 0.0)) -> LinearProblem:
         """From A ``(N, m, k)`` and y ``(N, m)``; m is 3 or 6, three readings of a kind.
 
-        ``spent`` readings of each kind went into parameters that are not in A any more.
+        So many readings of each kind as ``spent`` says went into parameters that are not in A any more.
         """
         H, g, yy, count = [], [], [], []
         for first in range(0, y.shape[1], 3):
@@ -49,7 +50,7 @@ class LinearProblem:
             H.append(rows.T @ rows)
             g.append(rows.T @ readings)
             yy.append(float(readings @ readings))
-            count.append(len(readings) - spent)
+            count.append(len(readings) - spent[first // 3])
         return cls(H, g, yy, count)
 
     def only(self, keep: Array) -> LinearProblem:

@@ -1,7 +1,8 @@
 """The readings with the kinematics taken out: what is left is all that an effect can be told by.
 
 Readings are y = J p + A x + noise. Integrating over p with its Gaussian prior leaves a problem in x alone, with y
-and A projected off J (the Frisch-Waugh theorem; the prior enters as readings of its own). A cause that free
+and A projected off J (the Frisch-Waugh theorem). For wide priors that is exact; where a prior is tight it errs on the
+careful side. A cause that free
 kinematics can imitate has no column left then, and no evidence can speak for it.
 """
 
@@ -25,14 +26,14 @@ class Marginal:
         J: ``(N m, k)`` whitened derivatives by the parameters, in units of ``scale``.
         factor: Cholesky factor of J^T J and the prior.
         y: ``(N, m)`` whitened readings, projected.
-        spent: share of the readings that the parameters use up.
+        spent: number of readings of each kind that the parameters use up.
     """
 
     sigma: Array
     J: Array
     factor: Array
     y: Array
-    spent: float
+    spent: tuple[float, ...]
 
     @classmethod
     def of(cls, y: Array, J: Array, prior_sigma: Array, sigma: Array) -> Marginal:
@@ -45,7 +46,9 @@ class Marginal:
         rows *= scale
         whitened = (y / sigma).ravel()
         left = whitened - rows @ cho_solve((factor, True), rows.T @ whitened)
-        spent = float(np.trace(cho_solve((factor, True), H)))
+        solved = cho_solve((factor, True), rows.T)
+        leverage = np.einsum("kr,rk->r", solved, rows).reshape(y.shape)
+        spent = tuple(float(leverage[:, k : k + 3].sum()) for k in range(0, y.shape[1], 3))
         return cls(sigma, rows, factor, left.reshape(y.shape), spent)
 
     def project(self, A: Array) -> Array:
@@ -59,4 +62,4 @@ class Marginal:
 
     def problem(self, projected: Array, y: Array | None = None) -> LinearProblem:
         """Of projected columns ``(N, m, K)``; noise is 1 per kind of reading."""
-        return LinearProblem.of(projected, self.y if y is None else y, self.spent / (len(self.sigma) // 3))
+        return LinearProblem.of(projected, self.y if y is None else y, self.spent)

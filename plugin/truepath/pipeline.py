@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,14 +74,13 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
     from truepath.next_poses import to_csv
     from truepath.report import write_report
 
-    if folder.exists() and not folder.is_dir():
-        raise InputError("the results need a folder", file=folder, expected="the name of a folder")
     files = [folder / name for name in ("calibration.json", "report.html")]
     poses = {folder / item.measure_next: item.poses for item in diagnosis.ambiguous if item.measure_next}
     files += [*poses, folder / "diagnosis.json"]
-    for file in files:
-        keep(file, data)
-    folder.mkdir(parents=True, exist_ok=True)
+    require_folder(folder, files, data)
+    for left_over in folder.glob("poses*.csv"):
+        if left_over not in poses:
+            left_over.unlink()  # of an earlier diagnosis: it would belong to nothing
     diagnosis.calibration.save(files[0])
     write_report(files[1], diagnosis)
     for file, q_rad in poses.items():
@@ -89,6 +88,25 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
         write_atomically(file, to_csv(q_rad))
     diagnosis.save(files[-1])
     return files
+
+
+def require_folder(folder: Path, files: Sequence[Path], data: Path) -> None:
+    """Makes a folder for results, if need be, and refuses what could not be written there.
+
+    Raises:
+        InputError: it is no folder, or a folder stands where a file has to be, or a file is the data itself.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        found = error.strerror or "something else of that name"
+        raise InputError(
+            "the results need a folder", file=folder, expected="the name of a folder", found=found
+        ) from None
+    for file in files:
+        keep(file, data)
+        if file.is_dir():
+            raise InputError("the results cannot be written", file=file, expected="a file", found="a folder")
 
 
 def keep(output: Path, *inputs: Path) -> None:
@@ -137,16 +155,28 @@ def stated_probe(robot: NominalRobot, probe: str) -> Array | None:
     return lie.make_pose(translation=offset * 1e-3)
 
 
-def simulate_campaign(spec: str, seed: int, campaign: Campaign, output: Path, truth: Path | None) -> int:
-    """Measures a virtual robot and writes the CSV (and what was hidden); returns the number of rows."""
+def simulate_campaign(
+    spec: str, seed: int, campaign: Campaign, output: Path, truth: Path | None, hide: Sequence[str] = ()
+) -> int:
+    """Measures a virtual robot, with the named causes hidden in it, and writes the CSV (and what was hidden).
+
+    Returns:
+        The number of rows.
+
+    Raises:
+        InputError: an unknown cause, a place where nothing can be written.
+    """
+    from truepath.virtual.hidden_causes import draw_causes
     from truepath.virtual.real_robot import RealRobot
     from truepath.virtual.simulate import free_poses, measure, to_csv, truth_json
 
     if truth is not None and (truth.resolve() == output.resolve() or not truth.parent.is_dir() or truth.is_dir()):
         raise InputError("the truth cannot be written here", file=truth, expected="another file in an existing folder")
     real = RealRobot(spec, seed)
-    measurements = measure(real, free_poses(real, campaign.poses, np.random.default_rng(campaign.seed)), campaign)
+    causes = draw_causes(real, hide)
+    q_rad = free_poses(real, campaign.poses, np.random.default_rng(campaign.seed))
+    measurements = measure(real, q_rad, campaign, causes)
     write_atomically(output, to_csv(measurements))
     if truth is not None:
-        write_atomically(truth, truth_json(real, campaign))
+        write_atomically(truth, truth_json(real, campaign, causes))
     return len(measurements)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from truepath.context import Context
@@ -41,8 +43,12 @@ def summary(fitted: FittedTerm, context: Context, robot: NominalRobot) -> str:
         text = place + _moved(fitted, motions(robot, context, fitted))
     constants = dict(term.constants)
     if "moment" in constants:
-        row = "row" in term.inputs
-        text += f", from {'line' if row else 't ='} {constants['moment']:.6g}{' of the file' if row else ' s'} on"
+        moment = constants["moment"]
+        text += (
+            f", from line {math.ceil(moment)} of the file on"
+            if "row" in term.inputs
+            else f", from t = {moment:.6g} s on"
+        )
     if "tau_s" in constants:
         text += f", time constant about {constants['tau_s']:.3g} s"
     waves = _strongest_waves(fitted)

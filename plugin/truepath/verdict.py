@@ -53,7 +53,8 @@ def not_testable(robot: NominalRobot, context: Context) -> list[NotTestable]:
         joints = _list([str(joint) for joint in blind])
         why = "the direction of arrival was not recorded"
         if blind and guessed:
-            why += f": backlash of joint {joints} cannot be seen, that of the others only by the side gravity pulls to"
+            place = f"joint{'s' if len(blind) > 1 else ''} {joints}"
+            why += f": backlash of {place} cannot be seen, that of the others only by the side gravity pulls to"
         found = [item for item in found if item.effect != "backlash"]
         found.append(NotTestable("backlash", tuple(f"approach{i + 1}" for i in range(robot.num_joints)), why))
     return found

@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 import numpy as np
 
 from truepath.context import Context
-from truepath.effects.base import Cause, Effect, FittedTerm, Term, basis, basis_function, probe_columns
+from truepath.effects.base import Cause, Effect, FittedTerm, Term, basis, probe_columns
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.motions import ChainPoses, Moves
@@ -20,7 +20,7 @@ CAUSES: dict[str, Cause] = {
     for cause in (
         import_module(f"{__name__}.{module.name}").EFFECT
         for module in iter_modules(__path__)
-        if module.name not in ("base", "readings", "steps")
+        if module.name not in ("base", "readings", "shape", "steps")
     )
 }
 EFFECTS: dict[str, Effect] = {name: cause for name, cause in CAUSES.items() if isinstance(cause, Effect)}
@@ -43,12 +43,8 @@ def effect_of(term: Term) -> Effect:
 
 
 def is_understood(term: Term) -> bool:
-    """Whether the effect can make sense of a term's parameters, which may come from a file."""
-    try:
-        basis_function(EFFECTS[term.effect], term)
-    except (ValueError, LookupError, ArithmeticError, RuntimeError, OverflowError, TypeError):
-        return False
-    return True
+    """Whether a term, which may come from a file, is one that its effect can make sense of."""
+    return any(shape.fits(term) for shape in EFFECTS[term.effect].shapes)
 
 
 def motions(robot: NominalRobot, context: Context, fitted: FittedTerm) -> Array:

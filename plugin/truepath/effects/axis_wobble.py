@@ -9,6 +9,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.effects.shape import COVERED, Shape
 from truepath.motions import COMPONENTS, Moves
 from truepath.robot import NominalRobot
 
@@ -24,6 +25,7 @@ class AxisWobble(Effect):
     """
 
     name = "axis_wobble"
+    shapes = (Shape(Moves.AXIS, ("theta",), COVERED, {"[xyz] (cos|sin) [1-3]": "m", "r[xy] (cos|sin) [1-3]": "rad"}),)
     plausible = "5 to 200 um, 5 to 300 urad"
     cause = "the bearing of the axis does not run true: the axis tilts or shifts as it turns"
     remedy = "have the bearing checked for run-out and play"

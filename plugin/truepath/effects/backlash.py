@@ -9,6 +9,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.effects.shape import COVERED, Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -25,6 +26,10 @@ class Backlash(Effect):
     """
 
     name = "backlash"
+    shapes = (
+        Shape(Moves.JOINT, ("approach",), (), {"width": "rad"}),
+        Shape(Moves.JOINT, ("gravity_torque",), (*COVERED, "soft_torque"), {"width": "rad"}),
+    )
     plausible = "10 to 1000 urad"
     cause = "play in the gear, or friction that winds it up: the joint rests on one side or on the other"
     remedy = "approach poses from one side; have the play of the gear adjusted"

@@ -18,6 +18,7 @@ import numpy as np
 from truepath.batched import BatchedFunction
 from truepath.context import Context
 from truepath.effects.readings import OF_A_POSE, is_reading, readings
+from truepath.effects.shape import Shape
 from truepath.lie import Array
 from truepath.motions import COMPONENTS, OF_ONE_JOINT, ChainPoses, Moves
 from truepath.robot import NominalRobot
@@ -109,11 +110,13 @@ class Effect(Cause, ABC):
     Attributes:
         needs: columns of the data that it cannot do without.
         plausible: its usual size, in words.
+        shapes: what its terms may look like.
         driver: what makes it change: ``pose``, ``time`` or ``temperature``.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
     plausible: str
+    shapes: ClassVar[tuple[Shape, ...]] = ()
     driver: ClassVar[str] = "pose"
 
     @abstractmethod

@@ -9,6 +9,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.effects.shape import COVERED, Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -19,6 +20,7 @@ class EncoderScale(Effect):
     """delta_phi_i = s_i theta_i."""
 
     name = "encoder_scale"
+    shapes = (Shape(Moves.JOINT, ("theta",), COVERED, {"scale": "rad/rad"}),)
     plausible = "1e-5 to 1e-3"
     cause = "the gear ratio in the controller, or the gain of the encoder, is wrong by a small share"
     remedy = "check gear ratio and encoder resolution in the controller's configuration"

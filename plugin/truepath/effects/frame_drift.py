@@ -9,6 +9,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term
+from truepath.effects.shape import Shape
 from truepath.effects.steps import clock_of, coarse, moments, near
 from truepath.motions import COMPONENTS, Moves
 from truepath.robot import NominalRobot
@@ -26,13 +27,17 @@ class FrameDrift(Effect):
     """
 
     name = "frame_drift"
+    shapes = (
+        Shape(Moves.BASE, ("time_s|row",), ("start", "end"), {"[xyz] order [1-6]": "m", "r[xyz] order [1-6]": "rad"}),
+        Shape(Moves.BASE, ("time_s|row",), ("moment", "share"), {"[xyz]": "m", "r[xyz]": "rad"}),
+    )
     driver = "time"
     plausible = "0.02 to 2 mm, 0.01 to 1 mrad"
     cause = "the tracker, or the pedestal of the robot, moved while poses were measured"
     remedy = "fasten both, let the tracker warm up, measure drift nests now and then; find the frames anew"
 
     def alternatives(self, robot: NominalRobot, context: Context) -> list[list[Term]]:
-        if len(context) < FEWEST_ROWS:
+        if len(context) < FEWEST_ROWS or np.ptp(clock_of(context)) <= 0:
             return []
         return [[self._slow(context)], *([self._step(moment, context)] for moment in coarse(moments(context)))]
 

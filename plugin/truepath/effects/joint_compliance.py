@@ -8,6 +8,7 @@ import casadi as ca
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.effects.shape import COVERED, Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -18,6 +19,7 @@ class JointCompliance(Effect):
     """delta_phi_i = c_i tau_i(theta), tau the gravity torque of arm, tool and payload in N m, c in rad / (N m)."""
 
     name = "joint_compliance"
+    shapes = (Shape(Moves.JOINT, ("gravity_torque",), COVERED, {"compliance": "rad/(N m)"}),)
     plausible = "1e-6 to 1e-4 rad/(N m)"
     cause = "gears and bearings give way under the weight of the arm"
     remedy = "keep the payload that was calibrated; check gear and bearings of a joint that is softer than its peers"

@@ -8,6 +8,7 @@ import casadi as ca
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term
+from truepath.effects.shape import Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -19,6 +20,7 @@ class MeasurementScale(Effect):
     """
 
     name = "measurement_scale"
+    shapes = (Shape(Moves.MEASURED_LENGTHS, (), (), {"scale": "m/m"}),)
     plausible = "1e-6 to 1e-3"
     cause = "the scale of the tracker is off, or the refraction of the air was not compensated"
     remedy = "check the tracker against a scale bar; enter temperature and pressure of the air"

@@ -9,6 +9,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term
+from truepath.effects.shape import Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -22,6 +23,7 @@ class ThermalExpansion(Effect):
     """
 
     name = "thermal_expansion"
+    shapes = (Shape(Moves.ROBOT_LENGTHS, ("temperature_c",), ("reference_c",), {"expansion": "1/K"}),)
     needs = ("temperature_c",)
     driver = "temperature"
     plausible = "12e-6 per K for steel, 23e-6 per K for aluminium"

@@ -8,6 +8,7 @@ import casadi as ca
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term
+from truepath.effects.shape import Shape
 from truepath.effects.steps import clock_of, coarse, moments, near
 from truepath.motions import COMPONENTS, Moves
 from truepath.robot import NominalRobot
@@ -17,6 +18,7 @@ class ToolShift(Effect):
     """From one moment on the probe sits elsewhere on the flange, by (x, y, z, rx, ry, rz) along its axes."""
 
     name = "tool_shift"
+    shapes = (Shape(Moves.PROBE, ("time_s|row",), ("moment",), {"[xyz]": "m", "r[xyz]": "rad"}),)
     driver = "time"
     plausible = "0.02 to 5 mm"
     cause = "reflector, probe or tool slipped in its holder"

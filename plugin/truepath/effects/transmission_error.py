@@ -14,6 +14,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.effects.shape import COVERED, Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -36,6 +37,7 @@ class TransmissionError(Effect):
     """
 
     name = "transmission_error"
+    shapes = (Shape(Moves.JOINT, ("theta",), COVERED, {r"(cos|sin|half-wave) [1-9]\d{0,3}": "rad"}),)
     plausible = "5 to 500 urad, from one to a hundred cycles per turn"
     cause = "gear, encoder or their mounting is out of round"
     remedy = "keep the correction table of this joint; have the gear looked at if the error is out of the usual"
@@ -88,7 +90,7 @@ def _bands(turns: float, most: float) -> tuple[EffectParameter, ...]:
 
 def _lines(turns: float, most: float) -> tuple[EffectParameter, ...]:
     return tuple(
-        EffectParameter(f"{kind} {k}", "rad", PLAUSIBLE_RAD, f"{k} cycles per turn")
+        EffectParameter(f"{kind} {k}", "rad", PLAUSIBLE_RAD, f"{k} cycle{'s' if k > 1 else ''} per turn")
         for k in range(1, int(most / min(turns, 1.0)) + 1)
         for kind in ("cos", "sin")
     )

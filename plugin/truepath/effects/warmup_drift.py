@@ -9,6 +9,7 @@ import numpy as np
 
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term
+from truepath.effects.shape import Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -20,6 +21,10 @@ class WarmupDrift(Effect):
     """a (1 - exp(-(t - t0) / tau)) for the zero of each joint and for the length of the links, t0 the first pose."""
 
     name = "warmup_drift"
+    shapes = (
+        Shape(Moves.JOINT, ("time_s",), ("tau_s", "start", "end"), {"creep": "rad"}),
+        Shape(Moves.ROBOT_LENGTHS, ("time_s",), ("tau_s", "start", "end"), {"growth": "m/m"}),
+    )
     needs = ("t_s",)
     driver = "time"
     plausible = "20 to 1000 urad per joint, 1e-6 to 1e-4 of the lengths, within minutes to hours"

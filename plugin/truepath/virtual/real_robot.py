@@ -51,7 +51,7 @@ class RealRobot:
 
         if seed < 0:
             raise InputError("a seed cannot be negative", found=str(seed))
-        self.spec = plants.cell_of(spec)
+        self.spec, self.seed = plants.cell_of(spec), seed
         builder = DiagramBuilder()
         self.plant, self._scene_graph = plants.add_cell(builder, self.spec)
         diagram = builder.Build()
@@ -72,6 +72,15 @@ class RealRobot:
             self._set(q)
             poses[k] = self._reflector.CalcPoseInWorld(self._context).GetAsMatrix4()
         return poses
+
+    def gravity_torques(self, q_rad: Array) -> Array:
+        """``(N, n)`` generalized forces of gravity on the joints at ``(N, n)``, N m, by Drake."""
+        index = [joint.velocity_start() for joint in self._arm.joints]
+        torques = np.empty(q_rad.shape)
+        for k, q in enumerate(q_rad):
+            self._set(q)
+            torques[k] = self.plant.CalcGravityGeneralizedForces(self._context)[index]
+        return torques
 
     def axis_lines(self) -> tuple[Array, Array]:
         """True directions ``(n, 3)`` and points ``(n, 3)`` of the joint axes at zero joints, in W, by Drake."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -12,7 +13,9 @@ from truepath import lie
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.measurements import Measurements
+from truepath.virtual.hidden_causes import HiddenCause, true_poses
 from truepath.virtual.real_robot import RealRobot
+from truepath.virtual.visits import CAMPAIGN_S, Visits
 
 MOST_TRIES_PER_POSE = 400
 LEAST_HEIGHT_M = 0.05  # of the reflector above the floor: lower, the tracker does not see it
@@ -66,21 +69,31 @@ def free_poses(real: RealRobot, count: int, rng: np.random.Generator) -> Array:
     raise InputError(f"only {len(found)} of {count} poses free of collision were found in {real.spec}")
 
 
-def measure(real: RealRobot, q_rad: Array, campaign: Campaign) -> Measurements:
-    """Measures the robot at joints ``(N, n)``, each ``campaign.repeats`` times, one round after the other."""
+def measure(
+    real: RealRobot, q_rad: Array, campaign: Campaign, causes: Mapping[str, HiddenCause] | None = None
+) -> Measurements:
+    """Measures the robot at joints ``(N, n)``, each ``campaign.repeats`` times, one round after the other.
+
+    With hidden causes the time is recorded, and with play the direction from which each joint arrived.
+    """
+    hidden = list((causes or {}).values())
     rng = np.random.default_rng([campaign.seed, 1])
-    X_MW = _somewhere(rng) if campaign.tracker else np.eye(4)
-    X_ME = np.tile(X_MW @ real.reflector_poses(q_rad), (campaign.repeats, 1, 1))
+    X_MW = _somewhere(rng) if campaign.tracker else None
+    q_rad, rounds = np.tile(q_rad, (campaign.repeats, 1)), np.tile(np.arange(len(q_rad)), campaign.repeats)
+    visits = Visits.of(real, q_rad, _times(campaign, len(q_rad)))
+    X_ME = true_poses(real, visits, hidden, X_MW)
     position = X_ME[:, :3, 3] + rng.normal(scale=1e-3 * campaign.noise_mm, size=(len(X_ME), 3))
     R_ME = None
     if campaign.orientation_noise_mrad is not None:
         turn = rng.normal(scale=1e-3 * campaign.orientation_noise_mrad, size=(len(X_ME), 3))
         R_ME = lie.from_rotation_vector(turn) @ X_ME[:, :3, :3]
     return Measurements(
-        q_rad=np.tile(q_rad, (campaign.repeats, 1)),
+        q_rad=q_rad,
         p_ME=position,
         R_ME=R_ME,
-        pose_id=np.tile(np.arange(len(q_rad)), campaign.repeats) if campaign.repeats > 1 else None,
+        time_s=visits.time_s if hidden else None,
+        approach=visits.approach if any(cause.needs_approach for cause in hidden) else None,
+        pose_id=rounds if campaign.repeats > 1 else None,
         source="virtual cell",
     )
 
@@ -93,21 +106,35 @@ def to_csv(measurements: Measurements) -> str:
     if measurements.R_ME is not None:
         quaternion = lie.to_quaternion(measurements.R_ME)
         columns |= {name: (quaternion[:, k], "%.12f") for k, name in enumerate(("qw", "qx", "qy", "qz"))}
+    if measurements.time_s is not None:
+        columns["t_s"] = (measurements.time_s, "%.1f")
+    if measurements.approach is not None:
+        columns |= {f"approach{i + 1}": (measurements.approach[:, i], "%d") for i in range(n)}
     if measurements.pose_id is not None:
         columns["pose_id"] = (measurements.pose_id, "%d")
     cells = np.stack([np.char.mod(form, values) for values, form in columns.values()], axis=1)
     return "\n".join([",".join(columns), *(",".join(row) for row in cells)]) + "\n"
 
 
-def truth_json(real: RealRobot, campaign: Campaign) -> str:
-    """What was hidden, for whoever wants to check a calibration afterwards."""
+def truth_json(real: RealRobot, campaign: Campaign, causes: Mapping[str, HiddenCause] | None = None) -> str:
+    """What was hidden, for whoever wants to check a calibration or a diagnosis afterwards."""
     content = {
         "schema": "truepath.truth/1",
         "cell": str(real.spec),
         "campaign": asdict(campaign),
         "hidden_frame_errors": real.hidden_errors,
     }
+    if causes:
+        content["hidden_causes"] = [
+            {"effect": name, "joints": cause.joints, "sizes": cause.sizes} for name, cause in causes.items()
+        ]
     return json.dumps(content, indent=1) + "\n"
+
+
+def _times(campaign: Campaign, count: int) -> Array:
+    """When the poses are measured: not quite regularly, the last one before the campaign is over."""
+    late = np.random.default_rng([campaign.seed, 2]).uniform(0.0, 0.9, count)
+    return np.round(CAMPAIGN_S / count * (np.arange(count) + late), 1)
 
 
 def _somewhere(rng: np.random.Generator) -> Array:
