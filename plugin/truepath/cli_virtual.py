@@ -38,11 +38,10 @@ def simulate(
     from truepath.pipeline import simulate_campaign
     from truepath.virtual.simulate import Campaign
 
+    names = [name.strip() for text in hide or () for name in text.split(",")]
     campaign = Campaign(poses, noise_mm, orientation_noise_mrad, repeats, tracker, poses_seed)
     with console.progress("simulating"):
-        rows = simulate_campaign(
-            robot, seed, campaign, output, truth, [name.strip() for text in hide or () for name in text.split(",")]
-        )
+        rows = simulate_campaign(robot, seed, campaign, output, truth, names)
     console.out.print(f"{rows} measurements written to {output}")
 
 
@@ -50,16 +49,19 @@ def demo(
     folder: Annotated[Path, typer.Option("--folder", help="where the results go")] = Path("truepath-demo"),
     seed: Annotated[int, typer.Option(help="of the virtual robot's hidden errors")] = 0,
 ) -> None:
-    """Run everything on the built-in virtual cell: simulate, calibrate, validate, correct, preview."""
+    """Run everything on the built-in virtual cell: simulate, diagnose, validate, correct, preview."""
     from truepath import console
     from truepath.demo import run_demo
 
     with console.progress("demo") as say:
         result = run_demo(folder, seed, say)
+    console.out.print(result.verdict, style="bold")
     console.print_accuracy("on 200 fresh poses", result.validation.nominal, result.validation.calibrated)
     console.out.print(
         f"welding path, tool error computed by Drake: mean {result.before_mm.mean():.3f} mm as programmed, "
         f"{result.after_mm.mean():.3f} mm corrected "
         f"({result.before_mm.mean() / result.after_mm.mean():.0f} times better)"
     )
-    console.out.print(f"see it: open {result.page.resolve()} in a browser")
+    console.out.print("open in a browser:")
+    console.out.print(f"  {result.report.resolve()}  what is wrong with the robot, and why")
+    console.out.print(f"  {result.preview.resolve()}  the path, as programmed and corrected")

@@ -78,6 +78,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
     poses = {folder / item.measure_next: item.poses for item in diagnosis.ambiguous if item.measure_next}
     files += [*poses, folder / "diagnosis.json"]
     require_folder(folder, files, data)
+    folder.mkdir(parents=True, exist_ok=True)
     for left_over in folder.glob("poses*.csv"):
         if left_over not in poses:
             left_over.unlink()  # of an earlier diagnosis: it would belong to nothing
@@ -91,18 +92,14 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
 
 
 def require_folder(folder: Path, files: Sequence[Path], data: Path) -> None:
-    """Makes a folder for results, if need be, and refuses what could not be written there.
+    """Refuses what could not be written there; makes nothing.
 
     Raises:
         InputError: it is no folder, or a folder stands where a file has to be, or a file is the data itself.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        found = error.strerror or "something else of that name"
-        raise InputError(
-            "the results need a folder", file=folder, expected="the name of a folder", found=found
-        ) from None
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise InputError("the results need a folder", file=folder, expected="a folder", found=f"the file {existing}")
     for file in files:
         keep(file, data)
         if file.is_dir():

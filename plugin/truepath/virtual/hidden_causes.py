@@ -64,7 +64,7 @@ class TransmissionError(HiddenCause):
     def drawn(cls, rng: np.random.Generator, real: RealRobot) -> HiddenCause:
         def wave(joint: int) -> dict[str, Any]:
             size = {"joint": joint, "amplitude_rad": rng.uniform(60e-6, 150e-6)}
-            return size | {"cycles_per_turn": int(rng.integers(2, 13)), "phase_rad": rng.uniform(-np.pi, np.pi)}
+            return size | {"cycles_per_turn": int(rng.integers(3, 13)), "phase_rad": rng.uniform(-np.pi, np.pi)}
 
         return cls([wave(joint) for joint in _some(rng, _first_half(real))])
 
