@@ -3,15 +3,15 @@
 import csv
 import json
 import time
+from html import unescape
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.systems.framework import DiagramBuilder
 from truepath import plants
 from truepath.calibration import load_calibration
 from truepath.demo import run_demo
 from truepath.errors import InputError
+from truth_by_drake import reflector_poses
 
 
 @pytest.fixture(scope="module")
@@ -33,42 +33,44 @@ def joints_in(path):
         return np.array([[float(row[f"q{i}_rad"]) for i in range(1, 7)] for row in csv.DictReader(file)])
 
 
-def reflector_by_drake(q, hidden_errors):
-    """Positions ``(N, 3)`` in the world on a fresh plant of the cell with these errors of its frames."""
-    plant, _ = plants.add_cell(DiagramBuilder(), "ur5_cell")
-    context = plant.CreateDefaultContext()
-    for name, error in hidden_errors.items():
-        frame = plant.GetFrameByName(name)
-        X = RigidTransform(RollPitchYaw(error["rpy_rad"]), error["translation_m"])
-        frame.SetPoseInParentFrame(context, frame.GetPoseInParentFrame(context) @ X)
-    points = []
-    for joints in q:
-        plant.SetPositions(context, joints)
-        points.append(plant.GetFrameByName("reflector").CalcPoseInWorld(context).translation())
-    return np.array(points)
-
-
 def test_the_demo_takes_less_than_a_minute(demo):
     assert demo[2] < 60
 
 
 def test_every_file_is_there(demo):
     folder, result, _ = demo
-    assert {path.name for path in folder.iterdir()} == {
-        *("measured.csv", "truth.json", "calibration.json", "weld_path.corrected.csv", "preview.html")
+    names = {path.name for path in folder.iterdir()}
+    assert names - {"poses.csv", "poses2.csv"} == {
+        *("measured.csv", "truth.json", "diagnosis.json", "report.html", "calibration.json"),
+        *("weld_path.corrected.csv", "preview.html"),
     }
-    assert result.page == folder / "preview.html"
+    assert result.report == folder / "report.html"
+    assert result.preview == folder / "preview.html"
     assert load_calibration(folder / "calibration.json").data.poses == 300
+
+
+def test_the_diagnosis_names_what_was_hidden_and_nothing_else(demo):
+    folder, result, _ = demo
+    hidden = {
+        cause["effect"]: cause["joints"] for cause in json.loads((folder / "truth.json").read_text())["hidden_causes"]
+    }
+    assert hidden.keys() == {"joint_compliance", "transmission_error"}
+    diagnosis = json.loads((folder / "diagnosis.json").read_text())
+    assert {finding["effect"]: finding["joints"] for finding in diagnosis["findings"]} == hidden
+    assert result.verdict == diagnosis["verdict"]
+    assert "joint compliance" in result.verdict
+    assert "transmission error" in result.verdict
+    assert result.verdict in unescape((folder / "report.html").read_text())
 
 
 def test_the_stated_gain_is_the_one_that_drake_finds_from_the_files_alone(demo):
     folder, result, _ = demo
-    hidden = json.loads((folder / "truth.json").read_text())["hidden_frame_errors"]
+    truth = json.loads((folder / "truth.json").read_text())
     programmed = joints_in(plants.models_dir() / "ur5" / "weld_path.csv")
     corrected = joints_in(folder / "weld_path.corrected.csv")
-    wanted = reflector_by_drake(programmed, {})
+    wanted = reflector_poses({}, programmed)
     before, after = (
-        1e3 * np.linalg.norm(reflector_by_drake(q, hidden) - wanted, axis=1) for q in (programmed, corrected)
+        1e3 * np.linalg.norm((reflector_poses(truth, q) - wanted)[:, :3, 3], axis=1) for q in (programmed, corrected)
     )
     assert result.before_mm == pytest.approx(before, abs=1e-6)
     assert result.after_mm == pytest.approx(after, abs=1e-6)
@@ -120,7 +122,9 @@ def test_the_command_ends_by_saying_what_was_gained_and_where_to_look(monkeypatc
     with pytest.raises(SystemExit) as stop:
         main()
     assert not stop.value.code
-    gain, page = capsys.readouterr().out.strip().splitlines()[-2:]
+    verdict, *_, gain, _, report, preview = capsys.readouterr().out.strip().splitlines()
+    assert verdict == json.loads((tmp_path / "results" / "diagnosis.json").read_text())["verdict"]
     assert "computed by Drake" in gain
     assert "times better" in gain
-    assert str(tmp_path / "results" / "preview.html") in page
+    assert str(tmp_path / "results" / "report.html") in report
+    assert str(tmp_path / "results" / "preview.html") in preview

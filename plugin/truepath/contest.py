@@ -20,6 +20,8 @@ FAR_SHADOW_SHARE = 0.05  # and one of a joint that the form has nothing to do wi
 MOST_ROUNDS = 16
 ALIKE = 0.6  # correlation
 QUIETER = 0.95
+ENOUGH_NAMELESS = 3  # rounds: that something is left is known by then
+NEARLY = 0.8
 WAVES, SIMPLE = ("transmission_error", "axis_wobble"), ("encoder_scale", "joint_compliance", "backlash")
 
 Progress = Callable[[str], None]
@@ -55,6 +57,7 @@ class Contest:
 
     def run(self) -> None:
         """Until nothing more passes."""
+        nameless_rounds = 0
         for _ in range(MOST_ROUNDS):
             fresh: dict[str, Trial] = {}
             best = self._best_of(self.named, fresh, LEAST_LOG_ODDS) or self._best_of(self.named, fresh, -np.inf)
@@ -64,9 +67,10 @@ class Contest:
                 rival = self._best_of(self.nameless, fresh, best.gain / NAMED_SHARE)
                 if rival is not None:
                     self.suspects.add(best.name)
-            else:
+            elif nameless_rounds < ENOUGH_NAMELESS:
                 best = self._best_of(self.nameless, fresh, LEAST_LOG_ODDS)
                 best = best or self._best_of(self.nameless, fresh, -np.inf)
+                nameless_rounds += 1
                 self.nameless_gain = max(self.nameless_gain, 0.0 if best is None else best.gain)
             if best is None:
                 return
@@ -145,13 +149,17 @@ class Contest:
         while stale := [name for name in able if name not in fresh]:
             name = max(stale, key=lambda name: self.gains.get(name, np.inf))
             top = max((trial.gain for trial in fresh.values() if trial.name in able), default=-np.inf)
-            if self.gains.get(name, np.inf) < max(top, promise):
+            if self.gains.get(name, np.inf) < max(top * NEARLY, promise):
                 break
             self.progress(f"is there {name.replace('_', ' ')}?")
             fresh[name] = self.search.trial(able[name])
             self.gains[name] = fresh[name].gain
-        best = max((fresh[name] for name in able if name in fresh), key=lambda trial: trial.gain, default=None)
-        return best if best is not None and best.gain > max(LEAST_LOG_ODDS, promise) else None
+        tried = [fresh[name] for name in able if name in fresh]
+        top = max((trial.gain for trial in tried), default=-np.inf)
+        if top <= max(LEAST_LOG_ODDS, promise):
+            return None
+        # A simple cause that brings nearly as much comes first: the rest may well be another one's.
+        return min((trial for trial in tried if trial.gain >= NEARLY * top), key=lambda t: (t.num_parameters, -t.gain))
 
     def _take(self, trial: Trial) -> None:
         before = self.search.fit

@@ -35,6 +35,11 @@ class Trial:
     gain: float = -np.inf
     terms: tuple[Term, ...] = ()
 
+    @property
+    def num_parameters(self) -> int:
+        """Of all terms."""
+        return sum(len(term.parameters) for term in self.terms)
+
 
 @dataclass
 class Search:

@@ -1,11 +1,12 @@
 """Causes that the virtual robot hides: they are in the data, the seed decides them, and a diagnosis names them."""
 
 import json
-import re
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 from command import is_refused
+from truepath.cli_virtual import simulate
 from truepath.diagnose import diagnose
 from truepath.errors import InputError
 from truepath.readers import read_measurements
@@ -52,8 +53,7 @@ def test_the_truth_file_and_drake_account_for_every_reading(robots, joints, name
 def test_it_stands_out_from_the_noise_of_a_tracker_and_is_no_wreck(robots, joints, name, seed):
     exact = Campaign(noise_mm=0.0)
     with_it, without = (
-        measure(robots[seed], joints[:60], exact, causes).p_ME
-        for causes in (draw_causes(robots[seed], [name]), None)
+        measure(robots[seed], joints[:60], exact, causes).p_ME for causes in (draw_causes(robots[seed], [name]), None)
     )
     assert 0.02e-3 < np.linalg.norm(with_it - without, axis=1).mean() < 1e-3
 
@@ -77,17 +77,6 @@ def test_a_tracker_that_slips_turns_the_scene_about_itself(robots, joints):
     assert np.array_equal(after.p_ME[~late], before.p_ME[~late])
     expected = size["shift_m"] + np.cross(size["turn_rad"], before.p_ME[late])
     assert np.abs(after.p_ME[late] - before.p_ME[late] - expected).max() < 1e-6
-
-
-def test_gravity_is_what_drake_says_of_the_perturbed_robot(robots, joints):
-    torque, step = robots[2].gravity_torques(joints[:3]), 1e-5
-    assert torque.shape == (3, 6)
-    for k, i in np.ndindex(3, 6):  # minus the slope of the potential energy
-        potential = []
-        for sign in (-1, 1):
-            robots[2]._set(joints[k] + sign * step * np.eye(6)[i])
-            potential.append(robots[2].plant.CalcPotentialEnergy(robots[2]._context))
-        assert torque[k, i] == pytest.approx((potential[0] - potential[1]) / (2 * step), abs=1e-5)
 
 
 # The seed of the robot decides
@@ -190,10 +179,8 @@ def test_an_unknown_cause_is_refused_with_the_list_of_known_ones(truepath, tmp_p
 
 
 def test_the_help_names_every_cause_that_there_is():
-    from truepath.cli_virtual import simulate
-
-    (option,) = simulate.__annotations__["hide"], 
-    assert re.findall(r"[a-z]+_[a-z]+|backlash", option.split("one by one")[1]) == list(CAUSES)
+    (option,) = get_type_hints(simulate, include_extras=True)["hide"].__metadata__
+    assert option.help.endswith(": " + ", ".join(CAUSES))
 
 
 def test_a_robot_that_weighs_nothing_cannot_be_soft(robots, monkeypatch):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial.transform import Rotation
 from truepath import plants
 from truepath.errors import InputError
@@ -13,6 +12,7 @@ from truepath.readers import read_measurements
 from truepath.virtual.real_robot import Imperfection, RealRobot
 from truepath.virtual.simulate import Campaign, free_poses, measure, to_csv, truth_json
 from truepath.virtual.truth import HELD, true_deviations
+from truth_by_drake import reflector_poses
 
 PERFECT = Imperfection(0.0, 0.0, 0.0, 0.0, 0.0)
 HOME = np.array([[0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]])
@@ -28,40 +28,23 @@ def joints(real):
     return free_poses(real, 60, np.random.default_rng(0))
 
 
-def reflector_by_drake(spec, q, hidden_errors=None):
-    """X_WE from a fresh plant of the cell, its frames moved by what the truth file says."""
-    from pydrake.math import RigidTransform, RollPitchYaw
-
-    plant, _ = plants.add_cell(DiagramBuilder(), spec)
-    context = plant.CreateDefaultContext()
-    for name, error in (hidden_errors or {}).items():
-        frame = plant.GetFrameByName(name)
-        X = RigidTransform(RollPitchYaw(error["rpy_rad"]), error["translation_m"])
-        frame.SetPoseInParentFrame(context, frame.GetPoseInParentFrame(context) @ X)
-    poses = []
-    for joints in q:
-        plant.SetPositions(context, joints)
-        poses.append(plant.GetFrameByName("reflector").CalcPoseInWorld(context).GetAsMatrix4())
-    return np.array(poses)
-
-
 # The robot
 
 
 def test_without_imperfection_the_real_robot_is_the_nominal_one(joints):
     perfect = RealRobot("ur5", 0, PERFECT)
-    assert np.abs(perfect.reflector_poses(joints) - reflector_by_drake("ur5_cell", joints)).max() < 1e-12
+    assert np.abs(perfect.reflector_poses(joints) - reflector_poses({}, joints)).max() < 1e-12
 
 
 def test_hidden_errors_move_the_tool_by_millimetres(real, joints):
-    moved = real.reflector_poses(joints)[:, :3, 3] - reflector_by_drake("ur5_cell", joints)[:, :3, 3]
+    moved = real.reflector_poses(joints)[:, :3, 3] - reflector_poses({}, joints)[:, :3, 3]
     assert 5e-4 < np.linalg.norm(moved, axis=1).mean() < 1e-2
 
 
 def test_the_truth_file_is_all_it_takes_to_build_the_same_robot(real, joints):
-    hidden = json.loads(truth_json(real, Campaign()))["hidden_frame_errors"]
-    assert len(hidden) == 6 + 1 + 1  # joints, mount of the base, holder of the reflector
-    assert np.abs(real.reflector_poses(joints) - reflector_by_drake("ur5_cell", joints, hidden)).max() < 1e-12
+    told = json.loads(truth_json(real, Campaign()))
+    assert len(told["hidden_frame_errors"]) == 6 + 1 + 1  # joints, mount of the base, holder of the reflector
+    assert np.abs(real.reflector_poses(joints) - reflector_poses(told, joints)).max() < 1e-12
 
 
 def test_the_same_seed_hides_the_same_errors_and_another_seed_others(real, joints):

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -118,7 +119,7 @@ def to_csv(measurements: Measurements) -> str:
 
 def truth_json(real: RealRobot, campaign: Campaign, causes: Mapping[str, HiddenCause] | None = None) -> str:
     """What was hidden, for whoever wants to check a calibration or a diagnosis afterwards."""
-    content = {
+    content: dict[str, Any] = {
         "schema": "truepath.truth/1",
         "cell": str(real.spec),
         "campaign": asdict(campaign),
