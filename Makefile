@@ -30,6 +30,7 @@ bench: $(READY) .venv-peers/.ready
 
 slow: $(READY)
 	$(BIN)/python workflows/coverage_study.py
+	$(BIN)/python workflows/hidden_effects.py
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 10), "Python 3.10 or newer is needed"'

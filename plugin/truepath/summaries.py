@@ -36,9 +36,12 @@ def summary(fitted: FittedTerm, context: Context, robot: NominalRobot) -> str:
     place = f"joint {term.joint}: " if term.joint is not None else ""
     if len(term.parameters) == 1:
         factor, unit = READABLE[term.parameters[0].unit]
-        text = (
-            f"{place}{term.parameters[0].name} {factor * fitted.values[0]:.4g} ± {factor * fitted.sigma[0]:.2g} {unit}"
-        )
+        value, sigma = factor * fitted.values[0], factor * fitted.sigma[0]
+        told = ""
+        if term.effect == "backlash":  # its sign says on which side the joint rests
+            side = ("behind", "ahead") if "approach" in term.inputs else ("against gravity", "with gravity")
+            told, value = f", the joint rests {side[int(value > 0)]}", abs(value)
+        text = f"{place}{term.parameters[0].name} {value:.4g} ± {sigma:.2g} {unit}{told}"
     else:
         text = place + _moved(fitted, motions(robot, context, fitted))
     constants = dict(term.constants)

@@ -24,6 +24,7 @@ from truepath.motions import COMPONENTS, OF_ONE_JOINT, ChainPoses, Moves
 from truepath.robot import NominalRobot
 
 FADE_RAD = np.radians(10.0)
+NEARLY_A_TURN_RAD, EVERYWHERE_RAD = np.radians(330.0), 8.0 * np.pi
 COLUMNS = {"t_s": "time_s", "temperature_c": "temperature_c"}  # of the data, and where a context has them
 
 
@@ -197,6 +198,11 @@ def fade(theta: Array, lower_rad: float, upper_rad: float) -> Array:
 
 
 def covered(context: Context, joint: int) -> tuple[tuple[str, float], ...]:
-    """Constants that make a term fade beyond the angles at which its joint (from 1) was measured."""
+    """Constants that make a term fade beyond the angles at which its joint (from 1) was measured.
+
+    Where next to nothing of a turn is missing, nothing lies beyond.
+    """
     theta = context.q_rad[:, joint - 1]
+    if np.ptp(theta) >= NEARLY_A_TURN_RAD:
+        return ("lower_rad", -EVERYWHERE_RAD), ("upper_rad", EVERYWHERE_RAD)
     return ("lower_rad", float(theta.min())), ("upper_rad", float(theta.max()))

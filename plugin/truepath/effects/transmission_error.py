@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from truepath.context import Context
-from truepath.effects.base import Effect, EffectParameter, Term, covered
+from truepath.effects.base import NEARLY_A_TURN_RAD, Effect, EffectParameter, Term, covered
 from truepath.effects.shape import COVERED, Shape
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
@@ -21,7 +21,7 @@ from truepath.robot import NominalRobot
 HIGHEST_CYCLES_PER_TURN = 128.0
 BAND_EDGES = (0.0, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)  # cycles per turn; a band shares one size
 PLAUSIBLE_RAD = 1e-5
-FULL_TURN = 330.0 / 360.0
+FULL_TURN = NEARLY_A_TURN_RAD / (2 * np.pi)
 LEAST_RANGE_RAD = np.radians(5.0)
 POSES_PER_WAVE = 1.2  # at least: more waves than that and they are not told from each other
 
