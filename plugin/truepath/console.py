@@ -114,11 +114,12 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
     for finding in diagnosis.findings:
         gain = finding.gain
         low, high = gain.ci95_mm
+        p_value = "< 1e-12" if finding.p_value < 1e-12 else f"{finding.p_value:.1g}"
         out.print(f"{finding.effect.replace('_', ' ')}: {finding.cause}", style="bold")
         for line in finding.summary:
             out.print(f"  {line}")
         out.print(
-            f"  p {'< 1e-12' if finding.p_value < 1e-12 else f'{finding.p_value:.1g}'}; mean error {gain.before_mm:.4f} -> {gain.after_mm:.4f} mm "
+            f"  p {p_value}; mean error {gain.before_mm:.4f} -> {gain.after_mm:.4f} mm "
             f"(gain {low:.4f} to {high:.4f} mm)\n  remedy: {finding.remedy}"
         )
     for item in diagnosis.ambiguous:
