@@ -27,8 +27,8 @@ class UnseenPoses:
 
     Attributes:
         kinematic, final: without and with the findings.
-        unseen: ``(N,)`` True for poses to judge by; gross errors are left out, the kinematic model being the judge,
-            so that no pose is left out because an effect fails on it.
+        unseen: ``(N,)`` True for poses to judge by; a gross error is left out, if it is one for both models: none is
+            left out because one of them fails on it.
     """
 
     def __init__(
@@ -37,8 +37,10 @@ class UnseenPoses:
         self.fit, self.evidence, self.measurements, self.context = fit, evidence, measurements, context
         self.kinematic = finish(fit, fit_effects(fit.fit, fit.context, ())).model
         self.final = finish(fit, evidence.fit).model
-        miss = np.linalg.norm(self.kinematic.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
-        self.sane = miss <= GROSS * np.median(miss)
+        self.sane = np.zeros(len(measurements), bool)
+        for model in (self.kinematic, self.final):
+            miss = np.linalg.norm(model.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
+            self.sane |= miss <= GROSS * np.median(miss)
         self.unseen = unseen & self.sane
 
     def model(self, terms: tuple[Term, ...]) -> CalibratedModel:
