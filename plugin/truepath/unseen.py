@@ -35,8 +35,7 @@ class UnseenPoses:
         self, fit: KinematicFit, evidence: Evidence, measurements: Measurements, context: Context, unseen: Array
     ) -> None:
         self.fit, self.evidence, self.measurements, self.context = fit, evidence, measurements, context
-        self.kinematic = finish(fit, fit_effects(fit.fit, fit.context, ())).model
-        self.final = finish(fit, evidence.fit).model
+        self.kinematic, self.final = self.model(()), finish(fit, evidence.fit).model
         self.sane = np.zeros(len(measurements), bool)
         for model in (self.kinematic, self.final):
             miss = np.linalg.norm(model.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
