@@ -31,6 +31,8 @@ COMPACT = (  # few parameters: their evidences can be compared as they are
 )
 PLAUSIBLE = {"joint_compliance": 2e-5, "encoder_scale": 2e-4}  # sizes that a robot may well have
 GEOMETRY = "kinematic"
+CAUTION = 2.0  # lengths are not independent of each other: their scatter tells too little
+SMALL_RAD = np.radians(90.0)
 
 
 @dataclass(frozen=True)
@@ -155,11 +157,14 @@ def hidden_behind_geometry(search: Search) -> Confusion | None:
     effects = tuple(dict.fromkeys(term.effect for term, _ in blurred))
     joints = sorted({term.joint for term, _ in blurred if term.joint})
     worst = 1e3 * max(moved for _, moved in blurred)
+    small = bool(np.all(np.ptp(search.seen.q_rad, axis=0) < SMALL_RAD))
+    where = "in the small part of the workspace that was measured" if small else "with these poses and this noise"
+    what = "Measure poses from the whole workspace." if small else "Measure more poses."
     why = (
-        f"in the small part of the workspace that was measured, {' and '.join(_plain(name) for name in effects)} of "
+        f"{where}, {' and '.join(_plain(name) for name in effects)} of "
         f"joint {', '.join(str(joint) for joint in joints)} looks like other link lengths and joint zeros: of a "
         f"usual size it would move the probe by up to {worst:.2f} mm and could not be seen. The calibration holds "
-        "where it was measured; elsewhere it may miss by as much. Measure poses from the whole workspace."
+        f"where it was measured; elsewhere it may miss by as much. {what}"
     )
     return Confusion((*effects, GEOMETRY), why, tuple(term for term, _ in blurred), everywhere=True)
 
@@ -188,18 +193,18 @@ def common_length(search: Search, kinematic: KinematicFit) -> Confusion | None:
         < (search.fit.sigma[0])
     ):
         return None
-    telling = (
-        "more than the scatter of the single lengths explains"
-        if abs(scale) > 3 * scatter
-        else ("no more than the scatter of the single lengths explains")
-    )
+    grown = any(t.effect == "thermal_expansion" for t in search.fit.terms)
+    causes = "the tracker's scale" if grown else "the tracker's scale or the temperature"
+    warmth = "" if grown else " a robot as a whole warmer or colder than its drawing,"
+    way_out = "" if grown else ", and so do these poses at a temperature some kelvins away, temperature_c recorded"
     why = (
         f"all lengths are {100 * abs(scale):.3f} % {'long' if scale > 0 else 'short'} on average "
-        f"(± {100 * scatter:.3f} %, {telling}): check the tracker's scale or the temperature. A tracker whose metre "
-        "is off, a robot as a whole warmer or colder than its drawing, and links of another length give the same "
-        "readings; poses at another temperature (temperature_c recorded), or a known length, would tell."
+        f"(± {100 * CAUTION * scatter:.3f} %, as the single lengths scatter): check {causes}. A tracker whose metre is "
+        f"off,{warmth} and links of another length give the same readings in any pose. A scale bar tells them "
+        f"apart{way_out}."
     )
-    return Confusion(("measurement_scale", "thermal_expansion", GEOMETRY), why, (term,))
+    effects = ("measurement_scale", GEOMETRY) if grown else ("measurement_scale", "thermal_expansion", GEOMETRY)
+    return Confusion(effects, why, (term,))
 
 
 def _plain(name: str) -> str:

@@ -30,8 +30,9 @@ from truepath.unseen import UnseenPoses
 from truepath.verdict import not_testable, verdict
 
 PARTS = 5  # one of them is kept away from fit and choice
-ENOUGH_POSES = 1600  # to see what is there, 1000 with orientations; more only takes longer
-ENOUGH_WITH_ORIENTATION = 1000
+ENOUGH_POSES = 1600  # to see what is there, fewer with orientations; more only takes longer
+ENOUGH_WITH_ORIENTATION = 640
+FEW_POSES = 800  # up to which the fifth that was kept away is worth another search for waves
 
 Progress = Callable[[str], None]
 
@@ -77,7 +78,8 @@ def diagnose(
     trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
     if evidence.named and trial.mean(trial.final) >= trial.mean(trial.kinematic):
         # What does not help on poses that nobody has looked at is not put into a model.
-        evidence = replace(evidence, named=(), fit=fit_effects(kinematic.fit, kinematic.context, ()))
+        plain = fit_effects(kinematic.fit, kinematic.context, ())
+        evidence = replace(evidence, named=(), fit=plain, with_doubtful=plain)
         trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
     findings = _findings(trial, evidence)
     progress(f"fitting all {len(measurements)} poses")
@@ -111,7 +113,7 @@ def diagnose(
 
 def _extended(whole: KinematicFit, evidence: Evidence) -> EffectFit:
     """All poses with what was found: the same effects at the same places, their waves and moments chosen anew."""
-    if len(whole.measurements) > ENOUGH_POSES or not evidence.named:
+    if len(whole.measurements) > FEW_POSES or not evidence.named:
         return fit_effects(whole.fit, whole.context, evidence.named)
     names = dict.fromkeys(term.effect for term in evidence.named)
     found = choose(whole.fit, whole.context, names, nameless=False).fit

@@ -138,7 +138,9 @@ def fit_effects(
             fixed = np.concatenate([prior, np.ones(len(offered))])
             posterior = infer(problem, group, offered.plausible, fixed, list(sigma[::3]), size)
             size = posterior.size
-            speaks = offered.spoken_for(posterior, k) if prune else np.ones(len(offered), bool)
+            speaks = offered.possible(posterior.x[k:])
+            if prune:
+                speaks &= offered.spoken_for(posterior, k)
             if speaks.all():
                 break
             offered, size = offered.only(speaks), size[np.unique(offered.group[speaks])]

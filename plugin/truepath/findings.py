@@ -29,6 +29,7 @@ class Evidence:
 
     Attributes:
         fit: kinematics with the named terms.
+        with_doubtful: the same with the named effects that were withdrawn because others could stand in for them.
         named: terms of the findings.
         nameless: terms of nameless forms that passed.
         p_values: of each effect that passed, named or nameless, corrected for the number of hypotheses.
@@ -37,6 +38,7 @@ class Evidence:
     """
 
     fit: EffectFit
+    with_doubtful: EffectFit
     named: tuple[Term, ...]
     nameless: tuple[Term, ...]
     p_values: dict[str, float]
@@ -63,9 +65,13 @@ def gather(kinematic: KinematicFit, visits: Array, progress: Progress = lambda _
     others = (hidden_behind_geometry(search), common_length(search, kinematic))
     confusions += [confusion for confusion in others if confusion is not None]
     withdrawn = {confusion.withdrawn for confusion in confusions}
-    named = tuple(term for term in named if term.effect not in withdrawn)
+    proved = tuple(term for term in named if term.effect not in withdrawn)
+    found = fit_effects(kinematic.fit, context, proved, prune=False, start=fit)
+    doubtful = found if proved == named else fit_effects(kinematic.fit, context, named, prune=False, start=fit)
+    named = proved
     return Evidence(
-        fit=fit_effects(kinematic.fit, context, named, prune=False, start=fit),
+        fit=found,
+        with_doubtful=doubtful,
         named=named,
         nameless=tuple(term for term in fit.terms if term.effect not in EFFECTS),
         p_values=p_values,

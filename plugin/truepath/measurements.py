@@ -21,6 +21,7 @@ from truepath.tables import Table
 OTHER_UNITS = {"t": "s", "temperature": "c", "payload": "kg"}
 SAME_POSE_RAD = 1e-3
 FARTHEST_M = 1000.0
+ABSOLUTE_ZERO_C = -273.15
 LIMIT_TOLERANCE_RAD = np.radians(2.0)
 
 
@@ -139,12 +140,16 @@ def from_table(table: Table, num_joints: int) -> Measurements:
     payload_kg = _optional(table, "payload_kg")
     if payload_kg is not None:
         _reject(table, (payload_kg < 0)[:, None], ["payload_kg"], "a payload cannot be negative", "0 or more")
+    temperature_c = _optional(table, "temperature_c")
+    if temperature_c is not None:
+        cold = (temperature_c < ABSOLUTE_ZERO_C)[:, None]
+        _reject(table, cold, ["temperature_c"], "nothing is that cold", f"{ABSOLUTE_ZERO_C} or more")
     return Measurements(
         q_rad=q_rad,
         p_ME=p_ME,
         R_ME=R_ME,
         time_s=time_s,
-        temperature_c=_optional(table, "temperature_c"),
+        temperature_c=temperature_c,
         payload_kg=payload_kg,
         approach=approach,
         pose_id=pose_id,

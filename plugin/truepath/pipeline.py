@@ -78,10 +78,11 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
     poses = {folder / item.measure_next: item.poses for item in diagnosis.ambiguous if item.measure_next}
     files += [*poses, folder / "diagnosis.json"]
     require_folder(folder, files, data)
-    folder.mkdir(parents=True, exist_ok=True)
-    for left_over in folder.glob("poses*.csv"):
-        if left_over not in poses:
-            left_over.unlink()  # of an earlier diagnosis: it would belong to nothing
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = error.strerror or "the system refuses it"
+        raise InputError("the folder cannot be made", file=folder, expected="a place to write to", found=why) from None
     diagnosis.calibration.save(files[0])
     write_report(files[1], diagnosis)
     for file, q_rad in poses.items():

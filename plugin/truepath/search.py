@@ -175,7 +175,7 @@ class Search:
         problem, size = self.marginal.problem(columns), None
         while len(terms):
             posterior = self.infer(problem, terms, size)
-            keep = terms.spoken_for(posterior)
+            keep = terms.spoken_for(posterior) & terms.possible(posterior.x)
             if keep.all():
                 forms = np.log(max(self.tried[effect.name] / len(terms.terms), 1.0))
                 gain = posterior.log_evidence - self.base.log_evidence - forms

@@ -125,6 +125,14 @@ class TermSet:
                 keep[self.term == int(np.argmin(odds))] = False
         return keep
 
+    def possible(self, values: Array) -> Array:
+        """``(K,)`` False for the parameters of terms whose values ``(K,)`` make no physical sense."""
+        keep = np.ones(len(self), bool)
+        for t, term in enumerate(self.terms):
+            own = self.term == t
+            keep[own] = effect_of(term).makes_sense(term, values[own])
+        return keep
+
     def fitted(self, values: Array, sigma: Array) -> tuple[FittedTerm, ...]:
         """The terms with their values ``(K,)`` and standard deviations ``(K,)``."""
         ends = np.cumsum([0, *(len(term.parameters) for term in self.terms)])

@@ -20,13 +20,17 @@ A_PATTERN = 0.001  # p value of a pattern that no form describes
 
 
 def unexplained(trial: UnseenPoses, evidence: Evidence) -> Unexplained:
-    """What is left when all findings are in the model."""
-    fit, context = evidence.fit, trial.fit.context.subset(evidence.fit.inlier)
+    """What is left when all findings are in the model, and what is doubtful only by name."""
+    fit = evidence.with_doubtful
+    context = trial.fit.context.subset(fit.inlier)
     looked_at, residual = trial.fit.measurements.subset(fit.inlier), fit.residual[fit.inlier]
     p_alike = alike_by_chance(residual, fit.sigma, _likenesses(context), _views(trial, context))
     p_repeats = more_than_repeats(looked_at, residual)
     p_forms = [evidence.p_values[term.effect] for term in evidence.nameless]
     floor, source = noise_floor_mm(looked_at, residual)
+    if source == "neighbours":  # a fit makes residuals smaller than the noise is
+        readings = residual.size
+        floor *= float(np.sqrt(readings / max(readings - len(fit.covariance) - len(fit.values), 1)))
     places: dict[str, set[int]] = {}
     for term in evidence.nameless:
         places.setdefault(term.effect, set()).update([] if term.joint is None else [term.joint])

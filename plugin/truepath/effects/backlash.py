@@ -10,6 +10,7 @@ import numpy as np
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
 from truepath.effects.shape import COVERED, Shape
+from truepath.lie import Array
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -52,6 +53,9 @@ class Backlash(Effect):
             return 0.5 * parameters[0] * reading["approach"]
         torque = reading["gravity_torque"]
         return 0.5 * parameters[0] * torque / ca.sqrt(torque**2 + reading["soft_torque"] ** 2)
+
+    def makes_sense(self, term: Term, values: Array) -> bool:
+        return term.inputs == ("approach",) or bool(values[0] > 0)  # nothing rests against gravity
 
 
 def _has_both_signs(values: np.ndarray) -> bool:

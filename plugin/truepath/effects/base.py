@@ -139,6 +139,10 @@ class Effect(Cause, ABC):
         ``reading`` holds a scalar for every input and every constant of the term.
         """
 
+    def makes_sense(self, term: Term, values: Array) -> bool:
+        """Whether values ``(k,)`` that a fit found are physically possible."""
+        return True
+
     def terms(self, robot: NominalRobot, context: Context) -> list[Term]:
         """Its first form."""
         forms = self.alternatives(robot, context)

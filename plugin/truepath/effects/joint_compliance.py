@@ -9,6 +9,7 @@ import casadi as ca
 from truepath.context import Context
 from truepath.effects.base import Effect, EffectParameter, Term, covered
 from truepath.effects.shape import COVERED, Shape
+from truepath.lie import Array
 from truepath.motions import Moves
 from truepath.robot import NominalRobot
 
@@ -37,6 +38,9 @@ class JointCompliance(Effect):
 
     def motion(self, term: Term, reading: Mapping[str, ca.SX], parameters: ca.SX) -> ca.SX:
         return parameters[0] * reading["gravity_torque"]
+
+    def makes_sense(self, term: Term, values: Array) -> bool:
+        return bool(values[0] > 0)  # nothing rises under a weight
 
 
 EFFECT = JointCompliance()

@@ -14,6 +14,7 @@ from truepath.nameless.form import Nameless, harmonics, parameters, parts
 from truepath.robot import NominalRobot
 
 CYCLES = (1, 2, 3)
+USUAL_LOAD_NM = 20.0
 
 
 def waves_of_a_joint(moves: Moves, joint: int | None, by: int, most: int = 4) -> Term:
@@ -82,6 +83,18 @@ def _bending(robot: NominalRobot, context: Context) -> list[Term]:
     return [Term("bending", Moves.AXIS, joint, ("moment_x", "moment_y"), (), own) for joint in joints]
 
 
+def _uneven_stiffness(robot: NominalRobot, context: Context) -> list[Term]:
+    """Gears that harden or soften under load: compliance alone takes their stiffness for constant."""
+    own = parameters(COMPONENTS[Moves.JOINT], ["square", "cube"], "load")
+    joints = range(1, robot.num_joints + 1)
+    return [Term("uneven stiffness", Moves.JOINT, joint, ("gravity_torque",), (), own) for joint in joints]
+
+
+def _power_of_load(feature: str, reading: Mapping[str, ca.SX]) -> ca.SX:
+    load = reading["gravity_torque"] / USUAL_LOAD_NM
+    return load * ca.fabs(load) if feature == "square" else load**3
+
+
 def _hanging_probe(robot: NominalRobot, context: Context) -> list[Term]:
     own = tuple(
         parameter
@@ -119,6 +132,12 @@ FORMS = (
         "links, bearings or the pedestal bend across the axes under the weight of the arm",
         _bending,
         lambda feature, reading: reading[feature],
+    ),
+    Nameless(
+        "uneven stiffness",
+        "a joint gives way by more, or by less, than in proportion to its load",
+        _uneven_stiffness,
+        _power_of_load,
     ),
     Nameless(
         "hanging probe",

@@ -97,7 +97,7 @@ def superscript(number: int) -> str:
 
 def probability(p_value: float) -> str:
     """``p = 0.02``, ``p = 3 × 10⁻¹²``, ``p < 10⁻³⁰⁰``."""
-    if p_value < 10.0**-LARGEST_EXPONENT:
+    if p_value <= 10.0**-LARGEST_EXPONENT:
         return f"p < 10{superscript(-LARGEST_EXPONENT)}"
     return "p = " + (significant(p_value, 2) if p_value >= 1e-3 else power_of_ten(p_value))
 
