@@ -270,3 +270,12 @@ def test_the_measured_data_are_not_overwritten_by_a_result(truepath, few, tmp_pa
     assert is_refused(truepath("diagnose", mine, "--robot", "ur5_cell", "-o", tmp_path), "the output is the input")
     assert mine.read_bytes() == few.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_files_of_the_customer_beside_the_results_stay_whatever_they_are_called(truepath, few, tmp_path):
+    measured, other = tmp_path / "poses_monday.csv", tmp_path / "poses_for_tuesday.csv"
+    measured.write_bytes(few.read_bytes())
+    other.write_text("keep")
+    assert truepath("diagnose", measured, "--robot", "ur5_cell", "-o", tmp_path).code == 0
+    assert measured.read_bytes() == few.read_bytes()
+    assert other.read_text() == "keep"

@@ -201,3 +201,14 @@ def test_errors_of_several_effects_add_up_joint_by_joint(ur5, joints, gravity_by
     np.testing.assert_allclose(found[:, 1], 1e-4 * joints[:, 1] + 1e-5 * torque[:, 1], atol=1e-12)
     np.testing.assert_allclose(found[:, 4], -3e-4 * joints[:, 4], atol=1e-15)
     assert not found[:, [0, 2, 3, 5]].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "inputs"), [("joint_compliance", ("gravity_torque",)), ("backlash", ("gravity_torque",))]
+)
+def test_nothing_gives_way_or_rests_against_gravity(name, inputs, ur5):
+    context = Context(np.random.default_rng(0).uniform(-3, 3, (200, 6)))
+    term = next(term for term in EFFECTS[name].terms(ur5, context) if term.joint == 2)
+    assert term.inputs == inputs
+    assert EFFECTS[name].makes_sense(term, np.array([1e-5]))
+    assert not EFFECTS[name].makes_sense(term, np.array([-1e-5]))
