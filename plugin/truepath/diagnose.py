@@ -79,7 +79,8 @@ def diagnose(
     if evidence.named and trial.mean(trial.final) >= trial.mean(trial.kinematic):
         # What does not help on poses that nobody has looked at is not put into a model.
         plain = fit_effects(kinematic.fit, kinematic.context, ())
-        evidence = replace(evidence, named=(), fit=plain, with_doubtful=plain)
+        unproved = tuple(dict.fromkeys(term.effect for term in evidence.named))
+        evidence = replace(evidence, named=(), fit=plain, with_doubtful=plain, unproved=unproved)
         trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
     findings = _findings(trial, evidence)
     progress(f"fitting all {len(measurements)} poses")

@@ -35,6 +35,7 @@ class Evidence:
         p_values: of each effect that passed, named or nameless, corrected for the number of hypotheses.
         log_odds: of each effect that passed.
         confusions: what cannot be told apart.
+        unproved: names of effects that passed here but did not hold on the poses kept away.
     """
 
     fit: EffectFit
@@ -44,6 +45,7 @@ class Evidence:
     p_values: dict[str, float]
     log_odds: dict[str, float]
     confusions: tuple[Confusion, ...]
+    unproved: tuple[str, ...] = ()
 
 
 def gather(kinematic: KinematicFit, visits: Array, progress: Progress = lambda _: None) -> Evidence:

@@ -26,7 +26,8 @@ def unexplained(trial: UnseenPoses, evidence: Evidence) -> Unexplained:
     looked_at, residual = trial.fit.measurements.subset(fit.inlier), fit.residual[fit.inlier]
     p_alike = alike_by_chance(residual, fit.sigma, _likenesses(context), _views(trial, context))
     p_repeats = more_than_repeats(looked_at, residual)
-    p_forms = [evidence.p_values[term.effect] for term in evidence.nameless]
+    # What looked like a named cause and was none is a pattern all the same.
+    p_forms = [evidence.p_values[name] for name in (*(t.effect for t in evidence.nameless), *evidence.unproved)]
     floor, source = noise_floor_mm(looked_at, residual)
     if source == "neighbours":  # a fit makes residuals smaller than the noise is
         readings = residual.size
