@@ -101,13 +101,6 @@ def test_nothing_is_left_of_nothing(whole, chain, ur5, context):
         assert empty.fitted(np.zeros(0), np.zeros(0)) == ()
 
 
-def test_two_sets_together_are_one_set_of_all_their_terms(terms, ur5, context, chain, whole):
-    joined = TermSet.of(ur5, context, terms[:2]).plus(TermSet.of(ur5, context, terms[2:]))
-    assert joined.terms == whole.terms
-    np.testing.assert_array_equal(joined.group, whole.group)
-    np.testing.assert_array_equal(joined.columns(chain, 3), whole.columns(chain, 3))
-
-
 def test_some_of_the_poses_have_their_own_rows(whole, chain):
     rows = np.array([5, 2, 60])
     own = whole.rows(rows).columns(chain.subset(rows), 3)

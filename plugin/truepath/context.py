@@ -67,6 +67,11 @@ class Context:
         return len(self.q_rad)
 
     @property
+    def known_payload_kg(self) -> Array | float:
+        """``(N,)`` or one number; 0 where none was recorded."""
+        return 0.0 if self.payload_kg is None else self.payload_kg
+
+    @property
     def clock(self) -> str:
         """Name of what tells the time of a campaign: ``time_s``, or ``row`` where no time was recorded."""
         return "row" if self.time_s is None else "time_s"

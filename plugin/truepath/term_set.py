@@ -66,10 +66,6 @@ class TermSet:
         """``(K,)`` True for the parameters of an effect."""
         return np.array([self.terms[t].effect == name for t in self.term], bool)
 
-    def plus(self, other: TermSet) -> TermSet:
-        """The parameters of both, these first."""
-        return TermSet._with(self.terms + other.terms, self.bases + other.bases)
-
     def only(self, keep: Array) -> TermSet:
         """Without the parameters for which ``keep`` ``(K,)`` is False."""
         terms, bases = [], []

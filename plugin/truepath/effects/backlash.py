@@ -37,7 +37,7 @@ class Backlash(Effect):
 
     def alternatives(self, robot: NominalRobot, context: Context) -> list[list[Term]]:
         parameter = EffectParameter("width", "rad", 1e-4, "width")
-        torque = robot.gravity_torque(context.q_rad, 0.0 if context.payload_kg is None else context.payload_kg)
+        torque = robot.gravity_torque(context.q_rad, context.known_payload_kg)
         terms = []
         for i in range(robot.num_joints):
             if context.approach is not None and _has_both_signs(context.approach[:, i]):

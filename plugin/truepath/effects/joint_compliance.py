@@ -26,7 +26,7 @@ class JointCompliance(Effect):
     remedy = "keep the payload that was calibrated; check gear and bearings of a joint that is softer than its peers"
 
     def alternatives(self, robot: NominalRobot, context: Context) -> list[list[Term]]:
-        torque = robot.gravity_torque(context.q_rad, 0.0 if context.payload_kg is None else context.payload_kg)
+        torque = robot.gravity_torque(context.q_rad, context.known_payload_kg)
         parameter = EffectParameter("compliance", "rad/(N m)", 1e-5, "compliance")
         return [
             [

@@ -45,8 +45,7 @@ def readings(
 
     def moment(component: int) -> Array:
         if not moments:
-            payload = 0.0 if context.payload_kg is None else context.payload_kg
-            moments.append(robot.gravity_moment(context.q_rad, payload))
+            moments.append(robot.gravity_moment(context.q_rad, context.known_payload_kg))
         return moments[0][:, own, component]
 
     def column(values: Array | None, index: int) -> Array | None:
