@@ -228,7 +228,7 @@ def test_a_bad_effect_ends_the_command_with_exit_code_2_and_writes_nothing(truep
 
 def test_the_payload_of_the_measurements_is_in_the_file_and_in_the_model(real_ur5, clean):
     some = clean.subset(np.arange(60))
-    calibration, _ = learn(real_ur5.robot, some)
+    calibration, *_ = learn(real_ur5.robot, some)
     assert calibration.data.payload_kg == np.median(some.payload_kg)
     assert calibration.model.payload_kg == calibration.data.payload_kg
 

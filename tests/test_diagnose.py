@@ -194,7 +194,7 @@ def test_the_calibration_holds_the_findings_and_their_worth(diagnosis):
 
 
 def test_calibrating_automatically_is_the_same_without_the_report(real_ur5, measured, diagnosis):
-    calibration, _ = learn(real_ur5.robot, measured, effects="auto", source="ur5")
+    calibration, *_ = learn(real_ur5.robot, measured, effects="auto", source="ur5")
     other = diagnosis.calibration.model_dump(exclude={"created_utc"})
     assert calibration.model_dump(exclude={"created_utc"}) == other
 

@@ -76,7 +76,7 @@ def test_the_cause_is_told_from_one_that_looks_alike(real):
 
 def test_the_gain_stated_on_held_out_poses_is_the_gain_on_fresh_ones(real):
     hidden = Hidden(real, wavy(2, 4e-4, 2))
-    calibration, _ = learn(real.robot, hidden.measured(400, 10), effects="auto")
+    calibration, *_ = learn(real.robot, hidden.measured(400, 10), effects="auto")
     stated = calibration.heldout
     assert stated.kinematic.position_mm.mean > 3 * stated.calibrated.position_mm.mean
     fresh = hidden.measured(1000, 11)
@@ -86,7 +86,7 @@ def test_the_gain_stated_on_held_out_poses_is_the_gain_on_fresh_ones(real):
 
 def test_a_path_corrected_with_an_effect_takes_the_real_robot_where_it_should_go(real):
     hidden = Hidden(real, wavy(2, 4e-4, 2))
-    calibration, _ = learn(real.robot, hidden.measured(400, 12), effects=["transmission_error"])
+    calibration, *_ = learn(real.robot, hidden.measured(400, 12), effects=["transmission_error"])
     model, q = calibration.model, hidden.poses(200, 13)
     q = q[np.abs(np.sin(q[:, 4])) > 0.3]  # keep away from the wrist singularity
     q = np.stack([row for row in q if _can_be_corrected(model, row)])

@@ -43,7 +43,7 @@ def told():
 @pytest.fixture(scope="module")
 def learnt(real, data, told):
     """Calibration and fit."""
-    return learn(real.robot, data, source="ur5_cell", progress=told.append)
+    return learn(real.robot, data, source="ur5_cell", progress=told.append)[:2]
 
 
 @pytest.fixture(scope="module")
@@ -113,13 +113,13 @@ def test_it_says_what_it_is_doing(learnt, told):
 
 
 def test_where_no_pose_can_be_spared_the_accuracy_is_left_open(real, joints):
-    calibration, _ = learn(real.robot, measure(real, joints[:12], Campaign()))
+    calibration, *_ = learn(real.robot, measure(real, joints[:12], Campaign()))
     assert calibration.heldout is None
 
 
 def test_measured_orientations_have_their_accuracy_and_noise_stated(real, joints):
     data = measure(real, joints[:100], Campaign(orientation_noise_mrad=0.05))
-    calibration, _ = learn(real.robot, data)
+    calibration, *_ = learn(real.robot, data)
     assert calibration.data.has_orientation
     assert calibration.noise.orientation_mrad == pytest.approx(0.05, rel=0.1)
     # Mean length of a vector of three such noises: 1.596 times one of them.
@@ -129,7 +129,7 @@ def test_measured_orientations_have_their_accuracy_and_noise_stated(real, joints
 def test_visits_of_one_pose_are_held_back_together(real, joints):
     """Else its error would be that of a pose which the fit had seen, and its barycentre would hide the noise."""
     data = measure(real, joints[:40], Campaign(repeats=5, noise_mm=0.1))
-    calibration, _ = learn(real.robot, data)
+    calibration, *_ = learn(real.robot, data)
     model = calibration.model
     fresh = joints[POSES:]
     bias = 1e3 * np.linalg.norm(model.predict(fresh)[:, :3, 3] - real.reflector_poses(fresh)[:, :3, 3], axis=1)
@@ -141,12 +141,12 @@ def test_visits_of_one_pose_are_held_back_together(real, joints):
 def test_the_name_and_the_hash_of_the_data_file_are_kept(real, data, tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text(to_csv(data))
-    calibration, _ = learn(real.robot, read_measurements(path, real.robot))
+    calibration, *_ = learn(real.robot, read_measurements(path, real.robot))
     assert calibration.data.file == "poses.csv"
     assert calibration.data.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert {"truepath", "python", "numpy", "drake", "casadi"} <= set(calibration.software)
 
 
 def test_two_runs_on_the_same_data_give_the_same_robot(real, data, calibration):
-    again, _ = learn(real.robot, data, source="ur5_cell")
+    again, *_ = learn(real.robot, data, source="ur5_cell")
     assert again.model_dump(exclude={"created_utc"}) == calibration.model_dump(exclude={"created_utc"})

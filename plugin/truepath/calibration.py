@@ -28,6 +28,7 @@ from truepath.calibration_parts import (
     RegionPart,
     RobotPart,
 )
+from truepath.calibration_residual import ResidualPart
 from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.model import CalibratedModel
@@ -49,6 +50,7 @@ class Calibration(Part):
     tool: FramePart
     parameters: list[Parameter]
     effects: list[EffectPart]
+    residual: ResidualPart | None = None
     region: RegionPart
     noise: NoisePart
     heldout: HeldOutPart | None
@@ -62,6 +64,8 @@ class Calibration(Part):
             raise ValueError(f"the parameters are not those of a robot with {n} joints")
         if not all(effect.fitted().term.fits(n) for effect in self.effects):
             raise ValueError(f"an effect at a place that a robot with {n} joints does not have")
+        if self.residual is not None and not self.residual.fits(n):
+            raise ValueError(f"a neural residual that is not for a robot with {n} joints")
         shapes = (len(self.region.lower_rad), len(self.region.upper_rad), len(self.region.mean_rad))
         if shapes != (n, n, n) or np.shape(self.region.whitening) != (n, n):
             raise ValueError(f"the region is not that of a robot with {n} joints")
@@ -81,6 +85,7 @@ class Calibration(Part):
             tool_is_given=self.tool.nominal_source == "given",
             effects=tuple(effect.fitted() for effect in self.effects),
             payload_kg=self.data.payload_kg,
+            residual=None if self.residual is None else self.residual.residual(),
         )
 
     def carrying(self, payload_kg: float | None) -> Calibration:

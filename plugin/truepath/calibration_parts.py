@@ -248,13 +248,15 @@ class AccuracyPart(Part):
 class HeldOutPart(Part):
     """Errors on data that neither the fit nor the choice of the model had seen.
 
-    ``kinematic`` is the calibration without named effects, where there are any.
+    ``kinematic`` is the calibration without named effects and networks, where there are any; ``named`` the one without
+    networks, where there are both.
     """
 
     method: str
     poses: Annotated[int, Field(gt=0)]
     nominal: AccuracyPart
     kinematic: AccuracyPart | None
+    named: AccuracyPart | None = None
     calibrated: AccuracyPart
 
 

@@ -10,13 +10,17 @@ import typer
 from truepath.cli_options import (
     CalibrationFile,
     DataFile,
+    Device,
     Format,
     Json,
     MeasuredIn,
     Output,
     Probe,
+    Residual,
+    Resume,
     RobotCheck,
     RobotSpec,
+    Seed,
     robot_named,
 )
 
@@ -38,29 +42,37 @@ def calibrate(
     effects: Annotated[
         str, typer.Option(help="auto: those that the data speaks for; none: kinematics only; or names, comma-separated")
     ] = "auto",
+    residual: Residual = "none",
     parameters: Annotated[bool, typer.Option("--parameters", help="also list every parameter")] = False,
+    device: Device = "cpu",
+    seed: Seed = 0,
+    checkpoint: Resume = None,
     json: Json = False,
 ) -> None:
     """Learn the real robot from measured poses and write a calibration file."""
     from truepath import console
     from truepath.learn import learn
-    from truepath.pipeline import keep, named_effects, naming
+    from truepath.pipeline import keep, named_effects, naming, networks
 
     keep(output, data)
-    with console.progress("calibrating") as say:
+    with networks(residual, device, seed, checkpoint, data, output) as options, console.progress("calibrating") as say:
         say("reading the robot")
         nominal = robot_named(robot)
         say("reading the data")
         measurements = _read(data, nominal, format, measured_in, probe)
         with naming(data):
-            calibration, _ = learn(nominal, measurements, effects=named_effects(effects), source=robot, progress=say)
+            calibration, _, network = learn(
+                nominal, measurements, effects=named_effects(effects), network=options, source=robot, progress=say
+            )
         calibration.save(output)
     if json:
         content = calibration.model_dump(by_alias=True, include={"robot": {"name", "model_sha256"}})
         content |= calibration.model_dump(include={"heldout", "noise", "data", "parameters", "effects"})
-        console.print_json({"calibration": str(output), **content})
+        console.print_json({"calibration": str(output), "network": network, **content})
         return
     console.print_calibration(calibration)
+    if network is not None:
+        console.out.print(f"neural residual: {network}")
     if parameters:
         console.print_parameters(calibration)
     console.out.print(f"written to {output}")
@@ -73,21 +85,25 @@ def diagnose(
     format: Format = "csv",
     measured_in: MeasuredIn = "tracker",
     probe: Probe = "unknown",
+    residual: Residual = "none",
+    device: Device = "cpu",
+    seed: Seed = 0,
+    checkpoint: Resume = None,
     json: Json = False,
 ) -> None:
     """Show what the simulation gets wrong, name the cause, extend the model, measure the gain."""
     from truepath import console
     from truepath.diagnose import diagnose as find_causes
-    from truepath.pipeline import naming, require_folder, write_diagnosis
+    from truepath.pipeline import naming, networks, require_folder, write_diagnosis
 
-    with console.progress("diagnosing") as say:
+    with networks(residual, device, seed, checkpoint, data, folder) as options, console.progress("diagnosing") as say:
         say("reading the robot")
         nominal = robot_named(robot)
         say("reading the data")
         measurements = _read(data, nominal, format, measured_in, probe)
         with naming(data):
             require_folder(folder, [folder / name for name in RESULTS], data)
-            diagnosis = find_causes(nominal, measurements, spec=robot, source=robot, progress=say)
+            diagnosis = find_causes(nominal, measurements, spec=robot, source=robot, network=options, progress=say)
         say("writing the report")
         files = write_diagnosis(diagnosis, folder, data)
     if json:

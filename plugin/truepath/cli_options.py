@@ -28,6 +28,19 @@ MeasuredIn = Annotated[
 Probe = Annotated[
     str, typer.Option(help="place of the probe on the flange: unknown, model (frame 'reflector'), or x,y,z in mm")
 ]
+Residual = Annotated[
+    str, typer.Option(help="network: learn what no cause explains by neural networks, if that is proved to help; none")
+]
+Device = Annotated[str, typer.Option(help="where networks learn: cpu or cuda", rich_help_panel="Networks")]
+Seed = Annotated[int, typer.Option(min=0, help="of the networks' chance", rich_help_panel="Networks")]
+Resume = Annotated[
+    Path | None,
+    typer.Option(
+        "--checkpoint",
+        help="keep in this file what the networks have learnt; after an interruption the same command goes on from it",
+        rich_help_panel="Networks",
+    ),
+]
 
 
 def robot_named(spec: str) -> NominalRobot:

@@ -5,20 +5,30 @@ from __future__ import annotations
 import platform
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 from truepath import calibration_parts as artefact
 from truepath.calibrate import BARELY_SEEN, Fit
 from truepath.calibration import Calibration
 from truepath.calibration_parts import HeldOutPart
+from truepath.calibration_residual import ResidualPart
 from truepath.iso9283 import Accuracy
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.region import cover
 from truepath.robot import NominalRobot
 
+if TYPE_CHECKING:
+    from truepath.residual.proof import Proof
+
 
 def held_out(
-    method: str, poses: int, nominal: Accuracy, kinematic: Accuracy | None, calibrated: Accuracy
+    method: str,
+    poses: int,
+    nominal: Accuracy,
+    kinematic: Accuracy | None,
+    calibrated: Accuracy,
+    named: Accuracy | None = None,
 ) -> HeldOutPart:
     """Errors on held-out data, by model, for the file."""
 
@@ -30,6 +40,7 @@ def held_out(
         poses=poses,
         nominal=part(nominal),
         kinematic=None if kinematic is None else part(kinematic),
+        named=None if named is None else part(named),
         calibrated=part(calibrated),
     )
 
@@ -40,8 +51,9 @@ def describe(
     fit: Fit,
     source: str,
     heldout: HeldOutPart | None,
+    proof: Proof | None = None,
 ) -> Calibration:
-    """The calibration file of a fit."""
+    """The calibration file of a fit; with what proved its networks, if it has any."""
     model = fit.model
     return Calibration(
         created_utc=datetime.now(timezone.utc).isoformat(timespec="seconds"),
@@ -62,6 +74,7 @@ def describe(
             for i, name in enumerate(fit.names)
         ],
         effects=[artefact.EffectPart.of(fitted) for fitted in model.effects],
+        residual=None if model.residual is None or proof is None else ResidualPart.of(model.residual, proof),
         region=artefact.RegionPart.of(cover(measurements.q_rad[~fit.outlier])),
         noise=artefact.NoisePart(
             position_mm=fit.sigma_position_m * 1e3,
@@ -89,7 +102,7 @@ def _frame(X: Array, X_nominal: Array, given: bool) -> artefact.FramePart:
 
 def _versions() -> dict[str, str]:
     versions = {"python": platform.python_version()}
-    for package in ("truepath", "drake", "casadi", "numpy", "scipy"):
+    for package in ("truepath", "drake", "casadi", "numpy", "scipy", "torch"):
         try:
             versions[package] = version(package)
         except PackageNotFoundError:

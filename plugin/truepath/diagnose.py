@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,21 +14,26 @@ from truepath.calibrate import Fit, KinematicFit, finish, fit_kinematics
 from truepath.calibration_parts import HeldOutPart
 from truepath.choose import choose
 from truepath.context import Context
-from truepath.describe import describe, held_out
+from truepath.describe import describe
 from truepath.diagnosis import Ambiguity, Diagnosis, Finding, FoundParameter, Stage, Unexplained
 from truepath.effect_fit import EffectFit, fit_effects
 from truepath.effects import EFFECTS
 from truepath.errors import CalibrationError
 from truepath.findings import Evidence, gather
-from truepath.learn import cross_validate
+from truepath.learn import cross_validate, on_kept_away, with_network
 from truepath.lie import Array
 from truepath.measurements import Measurements
+from truepath.model import CalibratedModel
 from truepath.plan_next import poses_that_tell
 from truepath.robot import NominalRobot
 from truepath.summaries import summary
 from truepath.unexplained import unexplained
 from truepath.unseen import UnseenPoses
 from truepath.verdict import not_testable, verdict
+
+if TYPE_CHECKING:
+    from truepath.residual.decision import Decision
+    from truepath.residual.options import Options
 
 PARTS = 5  # one of them is kept away from fit and choice
 ENOUGH_POSES = 1600  # to see what is there, fewer with orientations; more only takes longer
@@ -45,6 +51,7 @@ def diagnose(
     spec: str | Path | None = None,
     source: str = "plant",
     plan: bool = True,
+    network: Options | None = None,
     progress: Progress = lambda _: None,
 ) -> Diagnosis:
     """Finds causes, extends the model with them, measures the gain.
@@ -55,10 +62,12 @@ def diagnose(
         spec: model of the robot's cell, to plan poses free of collision; None plans within joint limits only.
         source: where the robot model came from, for the calibration file.
         plan: also plan what to measure next where causes cannot be told apart.
+        network: how to learn a neural residual for what has no name; None: do without one.
         progress: told in plain words what is being done.
 
     Raises:
         CalibrationError: the data cannot carry a calibration.
+        InputError: the networks are to be learnt on a device that is not there.
     """
     context = Context.of(measurements)
     unseen = np.zeros(len(measurements), bool)
@@ -83,24 +92,25 @@ def diagnose(
         evidence = replace(evidence, named=(), fit=plain, with_doubtful=plain, unproved=unproved)
         trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
     findings = _findings(trial, evidence)
+    learnt = None if network is None else _decide(trial, looked_at, network, progress)
     progress(f"fitting all {len(measurements)} poses")
     whole = fit_kinematics(robot, measurements, context)
     fit = finish(whole, _extended(whole, evidence))
     verification: HeldOutPart | None
-    if fit.model.effects:
-        how = "a fifth of the poses, drawn at random, kept away from fit and choice of effects"
-        accuracies = (trial.accuracy(model) for model in ("nominal", "kinematic", "final"))
-        verification = held_out(how, int(trial.unseen.sum()), *accuracies)
+    if fit.model.effects or (learnt is not None and learnt.model is not None):
+        verification = on_kept_away(trial, trial.kinematic, trial.final, None if learnt is None else learnt.model)
     else:
         verification = cross_validate(robot, measurements.subset(~fit.outlier), (), progress)
+    if learnt is not None and network is not None and learnt.model is not None:
+        fit = with_network(fit, measurements, context, network, progress)
     diagnosis = Diagnosis(
         verdict="",
         measurements=measurements,
-        calibration=describe(robot, measurements, fit, source, verification),
+        calibration=describe(robot, measurements, fit, source, verification, learnt.proof if learnt else None),
         fit=fit,
         outlier=fit.outlier,
         unseen=trial.unseen,
-        stages=tuple(_stages(trial, findings)),
+        stages=tuple(_stages(trial, findings, learnt)),
         findings=findings,
         ambiguous=tuple(_ambiguities(evidence, kinematic, spec, plan, progress)),
         unexplained=unexplained(trial, evidence),
@@ -108,6 +118,7 @@ def diagnose(
         seen_models={"kinematic": trial.kinematic, "final": trial.final},
         residuals={name: trial.residual(name) for name in ("nominal", "kinematic", "final")},
         joint_view={name: trial.joint_view(name) for name in ("kinematic", "final")},
+        network=learnt,
     )
     return replace(diagnosis, verdict=verdict(diagnosis))
 
@@ -142,7 +153,7 @@ def _findings(trial: UnseenPoses, evidence: Evidence) -> tuple[Finding, ...]:
             remedy=EFFECTS[name].remedy,
             p_value=evidence.p_values[name],
             log_odds=evidence.log_odds[name],
-            gain=trial.gain(trial.model(others)),
+            gain=trial.gain(trial.model(others), trial.final),
             parameters=tuple(parameters),
             summary=tuple(summary(part, trial.context, trial.final.robot) for part in fitted),
         )
@@ -150,13 +161,31 @@ def _findings(trial: UnseenPoses, evidence: Evidence) -> tuple[Finding, ...]:
     return tuple(sorted(found, key=lambda f: f.gain.after_mm - f.gain.before_mm))
 
 
-def _stages(trial: UnseenPoses, findings: tuple[Finding, ...]) -> list[Stage]:
-    stages = [Stage("nominal", trial.accuracy("nominal")), Stage("kinematic", trial.accuracy("kinematic"))]
+def _decide(trial: UnseenPoses, looked_at: Array, options: Options, progress: Progress) -> Decision:
+    from truepath.residual.decision import decide  # torch takes a second to import
+
+    def fit_to(rows: Array) -> CalibratedModel:
+        rows = np.intersect1d(rows, looked_at)
+        if len(rows) == np.count_nonzero(trial.seen[looked_at]):
+            return trial.final
+        part = fit_kinematics(trial.final.robot, trial.measurements.subset(rows), trial.context.subset(rows))
+        return finish(part, fit_effects(part.fit, part.context, trial.evidence.named, prune=False)).model
+
+    return decide(trial, fit_to, options, progress)
+
+
+def _stages(trial: UnseenPoses, findings: tuple[Finding, ...], learnt: Decision | None) -> list[Stage]:
+    stages = [
+        Stage("nominal", trial.nominal_accuracy(trial.final)),
+        Stage("kinematic", trial.accuracy(trial.kinematic)),
+    ]
     for count in range(1, len(findings) + 1):
         names = [finding.effect for finding in findings[:count]]
         terms = tuple(term for term in trial.evidence.named if term.effect in names)
         model = trial.final if count == len(findings) else trial.model(terms)
         stages.append(Stage("+".join(["kinematic", *names]), trial.accuracy(model)))
+    if learnt is not None and learnt.model is not None:
+        stages.append(Stage(f"{stages[-1].model}+network", trial.accuracy(learnt.model)))
     return stages
 
 

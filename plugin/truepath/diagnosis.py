@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from truepath.calibrate import Fit
 from truepath.calibration import Calibration
@@ -15,6 +15,9 @@ from truepath.iso9283 import Accuracy
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel
+
+if TYPE_CHECKING:
+    from truepath.residual.decision import Decision
 
 SCHEMA = "truepath.diagnosis/1"
 
@@ -138,6 +141,7 @@ class Diagnosis:
             m and rad. The models are those of ``seen_models``.
         joint_view: by stage (``kinematic``, ``final``) ``(N, n)``: the turn of each joint alone that would explain
             the residual of a pose best, rad. NaN where a joint moves the probe by too little.
+        network: what became of the networks, where they were asked for.
     """
 
     verdict: str
@@ -154,6 +158,7 @@ class Diagnosis:
     seen_models: dict[str, CalibratedModel]
     residuals: dict[str, Array] = field(default_factory=dict)
     joint_view: dict[str, Array] = field(default_factory=dict)
+    network: Decision | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
@@ -182,6 +187,7 @@ class Diagnosis:
                 "noise_floor_from": self.unexplained.floor_from,
                 "hints": list(self.unexplained.hints),
             },
+            "network": None if self.network is None else _network(self.network),
             "not_testable": [
                 {"effect": item.effect, "record": list(item.columns), "why": item.why} for item in self.not_testable
             ],
@@ -206,6 +212,21 @@ def _stage(stage: Stage) -> dict[str, Any]:
     return content
 
 
+def _network(network: Decision) -> dict[str, Any]:
+    gain = network.gain
+    return {
+        "entered": network.model is not None,
+        "why": network.why,
+        "p_value": network.proof.p_value,
+        "cross_validated_mm": {"before": network.proof.before_mm, "after": network.proof.after_mm},
+        "heldout_gain_mm": None if gain is None else _gain(gain),
+    }
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    return {"before": gain.before_mm, "after": gain.after_mm, "ci95": list(gain.ci95_mm)}
+
+
 def _finding(finding: Finding) -> dict[str, Any]:
     return {
         "effect": finding.effect,
@@ -215,11 +236,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "summary": list(finding.summary),
         "p_value": finding.p_value,
         "log_odds": finding.log_odds,
-        "heldout_gain_mm": {
-            "before": finding.gain.before_mm,
-            "after": finding.gain.after_mm,
-            "ci95": list(finding.gain.ci95_mm),
-        },
+        "heldout_gain_mm": _gain(finding.gain),
         "parameters": [
             {"name": p.name, "joint": p.joint, "value": p.value, "sigma": p.sigma, "unit": p.unit}
             for p in finding.parameters

@@ -18,10 +18,10 @@ from truepath.context import Context
 from truepath.effect_fit import EffectFit, kinematic_prior, linearise
 from truepath.lie import Array
 from truepath.robust_fit import RobustFit
+from truepath.splits import block_parts, random_parts
 from truepath.term_set import TermSet
 
 FOLDS = 5
-BLOCKS_PER_FOLD = 8
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class CrossValidation:
         worst = dict.fromkeys(groups, 0.0)
         A, y = self.A.reshape(-1, self.A.shape[2]), self.y.ravel()
         whole = A.T @ A + np.diag(self.precision), A.T @ y
-        for folds in (_random_folds(visits), _block_folds(len(self.y))):
+        for folds in (random_parts(visits, FOLDS), block_parts(len(self.y), FOLDS)):
             agreement, spread = dict.fromkeys(groups, 0.0), dict.fromkeys(groups, 0.0)
             for rows in folds:
                 for name, (predicted, left) in self._left_out(rows, groups, *whole).items():
@@ -88,16 +88,3 @@ class CrossValidation:
             left = y - A @ (x - change)
             out[name] = predicted, left
         return out
-
-
-def _random_folds(visits: Array) -> list[Array]:
-    order = np.random.default_rng(0).permutation(int(visits.max()) + 1)
-    part = np.empty(len(order), int)
-    part[order] = np.arange(len(order)) % FOLDS
-    return [np.flatnonzero(part[visits] == fold) for fold in range(FOLDS)]
-
-
-def _block_folds(count: int) -> list[Array]:
-    """Every fold takes some short blocks, so that a slow drift can be followed on both sides of each."""
-    block = np.arange(count) * FOLDS * BLOCKS_PER_FOLD // count
-    return [np.flatnonzero(block % FOLDS == fold) for fold in range(FOLDS)]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,12 +15,33 @@ from truepath.context import Context
 from truepath.describe import describe, held_out
 from truepath.errors import CalibrationError
 from truepath.iso9283 import accuracy
+from truepath.kept_away import KeptAway
+from truepath.lie import Array
 from truepath.measurements import Measurements
+from truepath.model import CalibratedModel
 from truepath.robot import NominalRobot
+
+if TYPE_CHECKING:
+    from truepath.residual.decision import Decision
+    from truepath.residual.options import Options
 
 FOLDS = 5
 
 Progress = Callable[[str], None]
+
+
+class Learnt(NamedTuple):
+    """A calibration, how it came about, and what became of the networks where they were asked for.
+
+    Attributes:
+        calibration: what to save.
+        fit: to all poses.
+        network: why networks are in the model, or not; None where nobody asked.
+    """
+
+    calibration: Calibration
+    fit: Fit
+    network: str | None = None
 
 
 def learn(
@@ -27,9 +49,10 @@ def learn(
     measurements: Measurements,
     *,
     effects: Sequence[str] | Literal["auto"] = (),
+    network: Options | None = None,
     source: str = "plant",
     progress: Progress = lambda _: None,
-) -> tuple[Calibration, Fit]:
+) -> Learnt:
     """Calibrates, and measures on held-out data what the calibration is worth.
 
     Args:
@@ -38,21 +61,32 @@ def learn(
         effects: names of effects to fit besides the kinematics, or ``auto``: those that the data speaks for. Then
             a fifth of the poses is kept away from fit and choice, and the effects are dropped again if they do
             not lower the error there (``diagnose``).
+        network: how to learn a neural residual for what has no name; it enters the calibration only if it lowers the
+            error on held-out poses significantly. None: do without one.
         source: where the robot model came from, for the file.
         progress: told in plain words what is being done.
 
     Raises:
         CalibrationError: the data cannot carry a calibration.
+        InputError: the networks are to be learnt on a device that is not there.
     """
     if effects == "auto":
         from truepath.diagnose import diagnose  # which itself describes and cross-validates
 
-        diagnosis = diagnose(robot, measurements, source=source, plan=False, progress=progress)
-        return diagnosis.calibration, diagnosis.fit
+        diagnosis = diagnose(robot, measurements, source=source, plan=False, network=network, progress=progress)
+        why = None if diagnosis.network is None else diagnosis.network.why
+        return Learnt(diagnosis.calibration, diagnosis.fit, why)
     progress(f"fitting {len(measurements)} poses")
     fit = calibrate(robot, measurements, effects)
+    if network is not None:
+        decision, verification = _decide(robot, measurements, fit, effects, network, progress)
+        if decision.model is not None:
+            fit = with_network(fit, measurements, Context.of(measurements), network, progress)
+            calibration = describe(robot, measurements, fit, source, verification, decision.proof)
+            return Learnt(calibration, fit, decision.why)
     verification = cross_validate(robot, measurements.subset(~fit.outlier), effects, progress)
-    return describe(robot, measurements, fit, source, verification), fit
+    why = None if network is None else decision.why
+    return Learnt(describe(robot, measurements, fit, source, verification), fit, why)
 
 
 def cross_validate(
@@ -89,3 +123,67 @@ def cross_validate(
         accuracies.get("kinematic"),
         accuracies["calibrated"],
     )
+
+
+def on_kept_away(
+    trial: KeptAway, kinematic: CalibratedModel, named: CalibratedModel, final: CalibratedModel | None
+) -> HeldOutPart:
+    """Accuracy on poses that were kept away, of models fitted without them.
+
+    Args:
+        trial: the poses.
+        kinematic: kinematics alone.
+        named: with named effects, if there are any.
+        final: with networks, if there are any.
+    """
+    how = "a fifth of the poses, drawn at random, kept away from fit and choice of effects"
+    without_networks = None
+    if final is not None:
+        how += " and networks"
+        without_networks = trial.accuracy(named) if named.effects else None
+    return held_out(
+        how,
+        int(trial.unseen.sum()),
+        trial.nominal_accuracy(named),
+        trial.accuracy(kinematic),
+        trial.accuracy(named if final is None else final),
+        without_networks,
+    )
+
+
+def with_network(
+    fit: Fit, measurements: Measurements, context: Context, options: Options, progress: Progress = lambda _: None
+) -> Fit:
+    """The fit with networks that have learnt what it leaves of its inliers."""
+    from truepath.residual.learning import learn_ensemble
+    from truepath.residual.samples import Samples
+
+    samples = Samples.of(fit.model, measurements, context).subset(~fit.outlier)
+    residual = learn_ensemble(samples, options, "learning the network from all poses", progress)
+    return replace(fit, model=replace(fit.model, residual=residual))
+
+
+def _decide(
+    robot: NominalRobot,
+    measurements: Measurements,
+    fit: Fit,
+    effects: Sequence[str],
+    network: Options,
+    progress: Progress,
+) -> tuple[Decision, HeldOutPart | None]:
+    """Whether networks help on a fifth of the poses that is kept away, and what the calibration is worth there."""
+    from truepath.residual.decision import decide
+
+    context = Context.of(measurements)
+    unseen = np.isin(np.arange(len(measurements)), measurements.folds(FOLDS)[0])
+    trial = KeptAway(measurements, context, unseen & ~fit.outlier, ~unseen & ~fit.outlier)
+
+    def fit_to(rows: Array) -> CalibratedModel:
+        return calibrate(robot, measurements.subset(rows), effects).model
+
+    decision = decide(trial, fit_to, network, progress)
+    if decision.model is None:
+        return decision, None
+    seen = np.flatnonzero(trial.seen)
+    kinematic = calibrate(robot, measurements.subset(seen)).model
+    return decision, on_kept_away(trial, kinematic, replace(decision.model, residual=None), decision.model)

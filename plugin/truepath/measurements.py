@@ -16,6 +16,7 @@ from truepath.columns import ANGLE_UNITS, LENGTH_UNITS, QUATERNION_COLUMNS, unit
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.robot import NominalRobot
+from truepath.splits import random_parts
 from truepath.tables import Table
 
 OTHER_UNITS = {"t": "s", "temperature": "c", "payload": "kg"}
@@ -91,11 +92,7 @@ class Measurements:
 
     def folds(self, count: int, seed: int = 0) -> list[Array]:
         """Row numbers of ``count`` random parts of nearly equal size; visits of one pose stay together."""
-        groups = self.groups()
-        order = np.random.default_rng(seed).permutation(groups.max() + 1)
-        part_of_group = np.empty(len(order), int)
-        part_of_group[order] = np.arange(len(order)) % count
-        return [np.flatnonzero(part_of_group[groups] == k) for k in range(count)]
+        return random_parts(self.groups(), count, seed)
 
 
 def from_table(table: Table, num_joints: int) -> Measurements:

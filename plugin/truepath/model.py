@@ -15,6 +15,7 @@ from truepath.robot import NominalRobot
 
 if TYPE_CHECKING:
     from truepath.effects.base import FittedTerm
+    from truepath.residual.ensemble import NetworkResidual
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,7 @@ class CalibratedModel:
             that were measured.
         payload_kg: carried during the measurements, beyond what the robot's model carries; assumed where a context
             names no payload.
+        residual: networks for what has no name; fades out where the data did not reach.
     """
 
     robot: NominalRobot
@@ -43,6 +45,7 @@ class CalibratedModel:
     tool_is_given: bool = False
     effects: tuple[FittedTerm, ...] = ()
     payload_kg: float = 0.0
+    residual: NetworkResidual | None = None
 
     def true_joints(self, poses: Array | Context) -> Array:
         """``(N, n)`` angles that the joints really take for commands ``(N, n)``."""
@@ -55,19 +58,31 @@ class CalibratedModel:
 
     def flange_poses(self, poses: Array | Context) -> Array:
         """``(N, 4, 4)`` poses X_BF of the real flange in the real base for commanded joints ``(N, n)``."""
-        phi = self.true_joints(poses)
-        if not self._moved(BEFORE_THE_FLANGE):
-            return poe.flange_poses(self.robot, self.p, phi)
-        chain = ChainPoses.of(self.robot, self.p, phi, np.eye(4), np.eye(4))
-        return self._shifted(chain.X_ME, self._context(poses), chain, BEFORE_THE_FLANGE)
+        context = self._context(poses)
+        phi = self.true_joints(context)
+        if self._moved(BEFORE_THE_FLANGE):
+            chain = ChainPoses.of(self.robot, self.p, phi, np.eye(4), np.eye(4))
+            X_BF = self._shifted(chain.X_ME, context, chain, BEFORE_THE_FLANGE)
+        else:
+            X_BF = poe.flange_poses(self.robot, self.p, phi)
+        return X_BF if self.residual is None else self._with_residual(X_BF, self.residual.shift(context.q_rad))
+
+    def _with_residual(self, X_BF: Array, shift: Array) -> Array:
+        """The flange such that the probe on it is shifted and turned by ``(N, 6)``, m and rad, in B."""
+        X_BE = X_BF @ self.X_FE
+        X_BE[:, :3, 3] += shift[:, :3]
+        X_BE[:, :3, :3] = lie.from_rotation_vector(shift[:, 3:]) @ X_BE[:, :3, :3]
+        return X_BE @ lie.invert(self.X_FE)
 
     def flange_poses_and_jacobian(self, q_rad: Array) -> tuple[Array, Array]:
         """The same and its Jacobian ``(N, 6, n)`` (angular, linear velocity of the flange origin, in B).
 
-        The Jacobian is that of the rigid robot at the true angles: effects change it by a few parts in a thousand.
+        The Jacobian is that of the rigid robot at the true angles: effects and networks change it by a few parts in a
+        thousand.
         """
         X_BF, jacobian = poe.flange_poses_and_jacobian(self.robot, self.p, self.true_joints(q_rad))
-        return (self.flange_poses(q_rad) if self._moved(BEFORE_THE_FLANGE) else X_BF), jacobian
+        as_it_is = self.residual is None and not self._moved(BEFORE_THE_FLANGE)
+        return (X_BF if as_it_is else self.flange_poses(q_rad)), jacobian
 
     def predict(self, poses: Array | Context) -> Array:
         """``(N, 4, 4)`` poses X_ME of the probe that a tracker would see.

@@ -25,6 +25,9 @@ from truepath.virtual.simulate import Campaign
 
 if TYPE_CHECKING:
     from truepath.diagnosis import Diagnosis
+    from truepath.residual.options import Options
+
+RESIDUALS = ("none", "network")
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,47 @@ def naming(file: Path) -> Iterator[None]:
         yield
     except CalibrationError as error:
         raise CalibrationError(f"{file}: {error}") from None
+
+
+@contextmanager
+def networks(residual: str, device: str, seed: int, checkpoint: Path | None, *others: Path) -> Iterator[Options | None]:
+    """How to learn networks as stated on the command line, or None; keeps the checkpoint until all is done.
+
+    Args:
+        residual: ``none`` or ``network``.
+        device, seed: see ``residual.options.Options``.
+        checkpoint: file for what has been learnt so far.
+        others: files of this run that the checkpoint must not be.
+
+    Raises:
+        InputError: an unknown word, a device that is not there, a checkpoint that is none.
+    """
+    if residual not in RESIDUALS:
+        raise InputError(f"unknown residual {residual!r}", expected=" or ".join(RESIDUALS))
+    if residual == "none":
+        if checkpoint is not None or device != "cpu":
+            raise InputError("there are no networks to learn", expected="--residual network with these options")
+        yield None
+        return
+    from truepath.residual.options import Options, require_device
+
+    require_device(Options(device=device).device)
+    if checkpoint is None:
+        yield Options(seed=seed, device=device)
+        return
+    from truepath.residual.checkpoint import Checkpoint
+
+    keep(checkpoint, *others)
+    desk = Checkpoint(checkpoint)
+    try:
+        yield Options(seed=seed, device=device, checkpoint=desk)
+    except KeyboardInterrupt:
+        from truepath.console import complain
+
+        desk.save()
+        complain(f"interrupted: the same command goes on from {checkpoint}")
+        raise
+    desk.remove()
 
 
 def correct_toolpath(

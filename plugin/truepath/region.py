@@ -10,6 +10,7 @@ from truepath.lie import Array
 
 JOINT_MARGIN_RAD = np.radians(1.0)
 LEAST_SPREAD_RAD = np.radians(1.0)
+FADE_RAD = np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -46,3 +47,14 @@ def cover(q_rad: Array) -> Region:
     whitening = np.linalg.inv(np.linalg.cholesky(covariance))
     radius = float(np.linalg.norm((q_rad - mean) @ whitening.T, axis=1).max())
     return Region(q_rad.min(axis=0), q_rad.max(axis=0), mean, whitening, radius)
+
+
+def fade(theta: Array, lower_rad: Array | float, upper_rad: Array | float) -> Array:
+    """1 within the limits, 0 beyond ten degrees outside, smooth between; any shapes that broadcast."""
+    return smooth_step(1.0 - np.maximum(lower_rad - theta, theta - upper_rad) / FADE_RAD)
+
+
+def smooth_step(t: Array) -> Array:
+    """0 up to t = 0, 1 from t = 1 on, with two continuous derivatives (a quintic) between."""
+    t = np.clip(t, 0.0, 1.0)
+    return t**3 * (10.0 - 15.0 * t + 6.0 * t**2)

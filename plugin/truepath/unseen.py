@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
 
 from truepath import lie
 from truepath.calibrate import KinematicFit, finish
 from truepath.context import Context
-from truepath.diagnosis import Gain
 from truepath.effect_fit import fit_effects
 from truepath.effects.base import Term
 from truepath.findings import Evidence
-from truepath.iso9283 import Accuracy, accuracy
+from truepath.kept_away import KeptAway
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel
@@ -22,59 +20,38 @@ GROSS = 10.0  # times the median miss: no model is to blame for such a reading
 LEAST_LEVER_M = 0.03
 
 
-class UnseenPoses:
+class UnseenPoses(KeptAway):
     """Models fitted to the poses that were looked at, on those that were not.
+
+    A gross error is left out, if it is one with and without the findings: none is left out because one of both fails
+    on it.
 
     Attributes:
         kinematic, final: without and with the findings.
-        unseen: ``(N,)`` True for poses to judge by; a gross error is left out, if it is one for both models: none is
-            left out because one of them fails on it.
     """
 
     def __init__(
         self, fit: KinematicFit, evidence: Evidence, measurements: Measurements, context: Context, unseen: Array
     ) -> None:
-        self.fit, self.evidence, self.measurements, self.context = fit, evidence, measurements, context
+        self.fit, self.evidence, self.context = fit, evidence, context
         self.kinematic, self.final = self.model(()), finish(fit, evidence.fit).model
-        self.sane = np.zeros(len(measurements), bool)
+        sane = np.zeros(len(measurements), bool)
         for model in (self.kinematic, self.final):
             miss = np.linalg.norm(model.predict(context)[:, :3, 3] - measurements.p_ME, axis=1)
-            self.sane |= miss <= GROSS * np.median(miss)
-        self.unseen = unseen & self.sane
+            sane |= miss <= GROSS * np.median(miss)
+        super().__init__(measurements, context, unseen=unseen & sane, seen=sane & ~unseen)
 
     def model(self, terms: tuple[Term, ...]) -> CalibratedModel:
         """The kinematics with some of the findings' terms."""
         found = fit_effects(self.fit.fit, self.fit.context, terms, prune=False, start=self.evidence.fit)
         return finish(self.fit, found).model
 
-    def predict(self, model: CalibratedModel | str) -> Array:
-        """``(N, 4, 4)``."""
+    def predict(self, model: str) -> Array:
+        """``(N, 4, 4)`` by ``nominal``, ``kinematic`` or ``final``, for all poses."""
         if model == "nominal":
             return self.final.predict_nominal(self.context)
-        chosen = getattr(self, model) if isinstance(model, str) else model
+        chosen: CalibratedModel = getattr(self, model)
         return chosen.predict(self.context)
-
-    def accuracy(self, model: CalibratedModel | str) -> Accuracy:
-        """On the unseen poses."""
-        part = self.measurements.subset(self.unseen)
-        return accuracy(self.predict(model)[self.unseen], part.p_ME, part.R_ME, part.groups())
-
-    def errors_mm(self, model: CalibratedModel) -> Array:
-        """``(k,)`` on the unseen poses."""
-        error = model.predict(self.context.subset(self.unseen))[:, :3, 3] - self.measurements.p_ME[self.unseen]
-        return 1e3 * np.linalg.norm(error, axis=1)
-
-    def mean(self, model: CalibratedModel) -> float:
-        """Mean error on the unseen poses, mm."""
-        return float(self.errors_mm(model).mean())
-
-    def gain(self, without: CalibratedModel) -> Gain:
-        """Of the final model over another, with Student's interval of the paired difference."""
-        before, after = self.errors_mm(without), self.errors_mm(self.final)
-        difference = before - after
-        mean, k = float(difference.mean()), len(difference)
-        half = float(stats.t.ppf(0.975, k - 1) * difference.std(ddof=1) / np.sqrt(k)) if k > 1 else np.inf
-        return Gain(float(before.mean()), float(after.mean()), (mean - half, mean + half))
 
     def residual(self, model: str) -> Array:
         """``(N, m)`` predicted less measured, in M."""

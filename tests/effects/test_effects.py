@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from truepath.context import Context
 from truepath.effects import CAUSES, EFFECTS, effect_named, effect_of, is_understood, joint_errors, motions, probe_shift
-from truepath.effects.base import FADE_RAD, EffectParameter, FittedTerm, Term, basis, fade, probe_columns
+from truepath.effects.base import EffectParameter, FittedTerm, Term, basis, probe_columns
 from truepath.effects.readings import is_reading
 from truepath.errors import InputError
 from truepath.motions import COMPONENTS, OF_ONE_JOINT, ChainPoses, Moves
 from truepath.nameless import NAMELESS
+from truepath.region import FADE_RAD, fade
 
 VOCABULARY = {
     "transmission_error", "joint_compliance", "backlash", "encoder_scale", "thermal_expansion", "warmup_drift",

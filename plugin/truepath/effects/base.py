@@ -21,9 +21,9 @@ from truepath.effects.readings import OF_A_POSE, is_reading, readings
 from truepath.effects.shape import Shape
 from truepath.lie import Array
 from truepath.motions import COMPONENTS, OF_ONE_JOINT, ChainPoses, Moves
+from truepath.region import fade
 from truepath.robot import NominalRobot
 
-FADE_RAD = np.radians(10.0)
 NEARLY_A_TURN_RAD, EVERYWHERE_RAD = np.radians(330.0), 8.0 * np.pi
 COLUMNS = {"t_s": "time_s", "temperature_c": "temperature_c"}  # of the data, and where a context has them
 
@@ -192,13 +192,6 @@ def basis_function(effect: Effect, term: Term) -> ca.Function:
 def probe_columns(term: Term, motion_basis: Array, chain: ChainPoses) -> Array:
     """``(N, 6, k)`` shift and turn of the probe per unit of each parameter of a term, for its basis ``(N, c, k)``."""
     return chain.displacement(term.moves, term.joint) @ motion_basis
-
-
-def fade(theta: Array, lower_rad: float, upper_rad: float) -> Array:
-    """``(N,)`` 1 within the limits, 0 beyond ten degrees outside, smooth between (quintic, C2)."""
-    beyond = np.maximum(lower_rad - theta, theta - upper_rad)
-    t = np.clip(1.0 - beyond / FADE_RAD, 0.0, 1.0)
-    return t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
 
 
 def covered(context: Context, joint: int) -> tuple[tuple[str, float], ...]:

@@ -1,0 +1,171 @@
+"""Differential evolution over networks of different hidden size (eq. 18 to 22 of the paper; Noman, Iba 2008)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from truepath.lie import Array
+from truepath.residual.limits import Settings
+from truepath.residual.network import Network, Tensor, with_ones
+from truepath.residual.population import Population, generator_for, uniform
+
+WORTH_MENTIONING = 1e-3  # of the error
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where an evolution stands; it goes on from here as if it had never stopped.
+
+    Attributes:
+        population: all individuals.
+        error: ``(P,)`` mean squared error of each.
+        generation: how many there have been.
+        stale: how many since the error fell last.
+        reference: the best error at that time.
+    """
+
+    population: Population
+    error: Tensor
+    generation: int
+    stale: int
+    reference: float
+
+    @property
+    def best(self) -> int:
+        return int(torch.argmin(self.error))
+
+    @property
+    def best_error(self) -> float:
+        return float(self.error.min())
+
+    @property
+    def network(self) -> Network:
+        """The best individual."""
+        return self.population.network(self.best)
+
+
+Observer = Callable[[State], None]
+
+
+def evolve(
+    x: Array,
+    target: Array,
+    settings: Settings,
+    seed: int,
+    *,
+    device: str = "cpu",
+    start: State | None = None,
+    observe: Observer = lambda _: None,
+) -> State:
+    """Evolves networks from ``x`` to ``target``; the same for the same seed, however often it was interrupted.
+
+    Args:
+        x: ``(N, d)`` inputs, scaled to about -1 to 1.
+        target: ``(N, k)`` outputs, scaled to about one.
+        device: ``cpu`` or ``cuda``.
+        start: where an earlier run was interrupted.
+        observe: told about each generation.
+    """
+    where = torch.device(device)
+    x1 = with_ones(torch.tensor(x, dtype=torch.float32, device=where))
+    wanted = torch.tensor(np.ascontiguousarray(target.T), dtype=torch.float32, device=where)
+    state = first_generation(x1, wanted, settings, seed) if start is None else start
+    while not has_ended(state, settings):
+        state = next_generation(state, x1, wanted, settings, seed)
+        observe(state)
+    return state
+
+
+def has_ended(state: State, settings: Settings) -> bool:
+    """By target, by number of generations, or because nothing happens any more."""
+    return (
+        state.best_error <= settings.target
+        or state.generation >= settings.generations
+        or state.stale >= settings.stagnation
+    )
+
+
+def first_generation(x1: Tensor, target: Tensor, settings: Settings, seed: int) -> State:
+    """Random networks of all hidden sizes."""
+    generator = generator_for(seed, 0, x1.device)
+    sizes = torch.randint(
+        settings.smallest, settings.largest + 1, (settings.individuals,), generator=generator, device=x1.device
+    )
+    population = Population.random(sizes, settings.largest, len(x1) - 1, len(target), generator, dtype=target.dtype)
+    error = population.mean_squared_error(x1, target)
+    return State(population, error, generation=0, stale=0, reference=float(error.min()))
+
+
+def next_generation(state: State, x1: Tensor, target: Tensor, settings: Settings, seed: int) -> State:
+    """Mutation, crossover, greedy selection; from time to time the hidden sizes step."""
+    generation = state.generation + 1
+    generator = generator_for(seed, generation, x1.device)
+    trial = trials(state.population, state.best, settings, generator)
+    error = trial.mean_squared_error(x1, target)
+    better = error < state.error  # eq. 21
+    population, error = state.population.where(better, trial), torch.where(better, error, state.error)
+    best = float(error.min())
+    if best > settings.target and generation % settings.sizes_every == 0:
+        population, changed = stepped(population, int(torch.argmin(error)), settings, generator)
+        error = torch.where(changed, population.mean_squared_error(x1, target), error)
+    fell = best < (1.0 - WORTH_MENTIONING) * state.reference
+    return State(population, error, generation, 0 if fell else state.stale + 1, best if fell else state.reference)
+
+
+def trials(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
+    """A trial for each individual: the best one with a difference of two others, crossed with the individual itself.
+
+    Mutation (eq. 19) takes the hidden size of the best: what two others have beyond it is disregarded, what they lack
+    is drawn at random. Crossover (eq. 20) takes single numbers of the individual where it has them.
+    """
+    count, room = len(population), population.room
+    size, device = int(population.sizes[best]), population.sizes.device
+    a = torch.randint(count, (count,), generator=generator, device=device)
+    b = (a + torch.randint(1, count, (count,), generator=generator, device=device)) % count
+    has = population.has()[:, :size]
+    hidden, output, bias = population.hidden[:, :size], population.output[:, :, :size], population.bias
+    grown = [_unified(hidden, has[:, :, None], who, generator) for who in (a, b)]
+    mutant_hidden = hidden[best] + settings.factor * (grown[0] - grown[1])
+    grown = [_unified(output, has[:, None, :], who, generator) for who in (a, b)]
+    mutant_output = output[best] + settings.factor * (grown[0] - grown[1])
+    mutant_bias = bias[best] + settings.factor * (bias[a] - bias[b])
+
+    def crossed(own: Tensor, mutant: Tensor, has_it: Tensor | None) -> Tensor:
+        keep = torch.rand(own.shape, generator=generator, device=device) > settings.crossover
+        return torch.where(keep if has_it is None else keep & has_it, own, mutant)
+
+    pad = (0, room - size)
+    return Population(
+        torch.nn.functional.pad(crossed(hidden, mutant_hidden, has[:, :, None]), (0, 0, *pad)),
+        torch.nn.functional.pad(crossed(output, mutant_output, has[:, None, :]), pad),
+        crossed(bias, mutant_bias, None),
+        torch.full_like(population.sizes, size),
+    )
+
+
+def _unified(genes: Tensor, has: Tensor, who: Tensor, generator: torch.Generator) -> Tensor:
+    """The genes of some individuals in the length of the best: random where an individual has none."""
+    missing = ~has[who]
+    if not missing.any():
+        return genes[who]
+    return torch.where(missing, uniform(genes.shape, generator, genes.device, genes.dtype), genes[who])
+
+
+def stepped(
+    population: Population, best: int, settings: Settings, generator: torch.Generator
+) -> tuple[Population, Tensor]:
+    """Hidden sizes stepped towards, and beyond, that of the best (eq. 22); and who has lost a neuron, ``(P,)``.
+
+    A new neuron listens at random and says nothing yet, so that nobody becomes worse by growing.
+    """
+    sizes = population.sizes
+    larger = sizes > sizes[best]
+    new = torch.where(larger, sizes - 1, sizes + 1).clamp(settings.smallest, settings.largest)
+    fresh = population.has().logical_not()[:, :, None]
+    listening = uniform(tuple(population.hidden.shape), generator, sizes.device, population.hidden.dtype)
+    hidden = torch.where(fresh, listening, population.hidden)
+    return replace(population, hidden=hidden, sizes=new).trimmed(), new < sizes
