@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from truepath.residual.network import Network
     from truepath.residual.proof import Proof
 
-Rows = list[list[Finite]]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+LARGEST = 1e12  # no weight and no angle is beyond it; sums and products of larger numbers may be no numbers
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Rows = list[list[Number]]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 KINDS = (3, 6)  # outputs: a position, or a position and a turn
 
 
@@ -25,7 +27,7 @@ class NetworkPart(Part):
 
     hidden: Annotated[Rows, Field(min_length=1)]
     output: Annotated[Rows, Field(min_length=1)]
-    bias: list[Finite]
+    bias: list[Number]
 
     @classmethod
     def of(cls, network: Network) -> NetworkPart:
@@ -56,8 +58,8 @@ class NetworkPart(Part):
 class ReachPart(Part):
     """Where the data was: see ``residual.reach.Reach``."""
 
-    lower_rad: list[Finite]
-    upper_rad: list[Finite]
+    lower_rad: list[Number]
+    upper_rad: list[Number]
     poses_rad: Annotated[Rows, Field(min_length=1)]
     median: Positive
     spacing: Positive

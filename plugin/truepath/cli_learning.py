@@ -96,7 +96,8 @@ def diagnose(
     from truepath.diagnose import diagnose as find_causes
     from truepath.pipeline import naming, networks, require_folder, write_diagnosis
 
-    with networks(residual, device, seed, checkpoint, data, folder) as options, console.progress("diagnosing") as say:
+    results = [folder / name for name in (*RESULTS, "poses.csv")]
+    with networks(residual, device, seed, checkpoint, data, *results) as options, console.progress("diagnosing") as say:
         say("reading the robot")
         nominal = robot_named(robot)
         say("reading the data")

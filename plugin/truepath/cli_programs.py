@@ -85,6 +85,7 @@ def export(
     loaded = load_calibration(calibration)
     urdf = find_urdf(robot or loaded.robot.source, tuple(loaded.robot.joint_names), loaded.robot.name)
     write_calibrated_urdf(loaded.model, urdf, output)
-    if loaded.effects:
-        console.warn("a URDF is rigid: the named effects of the calibration are not in it")
+    left_out = ["the named effects"] * bool(loaded.effects) + ["the networks"] * (loaded.residual is not None)
+    if left_out:
+        console.warn(f"a URDF is rigid: {' and '.join(left_out)} of the calibration are not in it")
     console.out.print(f"written to {output}")

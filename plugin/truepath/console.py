@@ -14,6 +14,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from truepath.calibration import Calibration
     from truepath.calibration_parts import AccuracyPart
+    from truepath.calibration_residual import ResidualPart
     from truepath.correct import Correction
     from truepath.diagnosis import Diagnosis
     from truepath.iso9283 import Accuracy
@@ -50,9 +51,17 @@ def print_accuracy(
     before: Accuracy | AccuracyPart,
     after: Accuracy | AccuracyPart,
     between: Accuracy | AccuracyPart | None = None,
+    named: Accuracy | AccuracyPart | None = None,
 ) -> None:
-    """A table of errors of the nominal robot, of one with calibrated kinematics only, and of the calibrated one."""
-    models = {"nominal": before, "kinematics": between, "calibrated": after}
+    """A table of errors of several models of a robot.
+
+    Args:
+        title: of the table.
+        before, after: of the nominal robot, and of the calibrated one.
+        between: with calibrated kinematics only.
+        named: with named causes too, but without networks.
+    """
+    models = {"nominal": before, "kinematics": between, "named causes": named, "calibrated": after}
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     table.add_column("error")
     table.add_column("model")
@@ -79,7 +88,7 @@ def print_calibration(calibration: Calibration) -> None:
     if calibration.heldout is not None:
         held_out = calibration.heldout
         title = f"on {held_out.poses} poses that the fit had not seen"
-        print_accuracy(title, held_out.nominal, held_out.calibrated, held_out.kinematic)
+        print_accuracy(title, held_out.nominal, held_out.calibrated, held_out.kinematic, held_out.named)
     else:
         warn("too few poses to hold any back: the accuracy on new poses is not known")
     spread = f"{noise.position_mm:.4f} mm per axis"
@@ -91,6 +100,8 @@ def print_calibration(calibration: Calibration) -> None:
         joints = ", ".join(str(effect.joint) for effect in found if effect.joint is not None)
         place = f" on joint {joints}" if joints else ""
         out.print(f"{name}{place}: {found[0].cause}; {found[0].remedy}")
+    if calibration.residual is not None:
+        out.print(f"networks: {_networks(calibration.residual)}")
     if data.outlier_lines:
         shown = ", ".join(map(str, data.outlier_lines[:12])) + (" ..." if len(data.outlier_lines) > 12 else "")
         warn(f"{len(data.outlier_lines)} outliers left out, lines {shown}")
@@ -122,6 +133,9 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
             f"  p {p_value}; mean error {gain.before_mm:.4f} -> {gain.after_mm:.4f} mm "
             f"(gain {low:.4f} to {high:.4f} mm)\n  remedy: {finding.remedy}"
         )
+    if diagnosis.network is not None:
+        out.print("neural residual", style="bold")
+        out.print(f"  {diagnosis.network.why}")
     for item in diagnosis.ambiguous:
         warn(f"cannot be told apart: {', '.join(item.effects)}")
         out.print(f"  {item.why}" + (f"\n  poses that would tell: {item.measure_next}" if item.measure_next else ""))
@@ -159,5 +173,15 @@ def print_correction(correction: Correction) -> None:
         f"predicted error of the tool: mean {before.mean():.3f} mm, max {before.max():.3f} mm before; "
         f"{after.max():.1e} mm after, on top of what the calibration leaves unexplained"
     )
+    if correction.networks is not None and len(correction.networks.spoken_mm):
+        spread = correction.networks.spoken_mm
+        out.print(f"networks: spread {spread.mean():.3f} mm on average, {spread.max():.3f} mm at most")
     for warning in correction.warnings:
         warn(f"warning: {warning}")
+
+
+def _networks(residual: ResidualPart) -> str:
+    """How many, of what size. What proved them is said by the command, which says why they are left out as well."""
+    sizes = sorted(len(network.hidden) for network in residual.networks)
+    size = f"{sizes[0]}" if sizes[0] == sizes[-1] else f"{sizes[0]} to {sizes[-1]}"
+    return f"{len(sizes)} of {size} hidden neurons"

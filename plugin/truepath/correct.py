@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from truepath.errors import CorrectionError, InputError
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
 from truepath.model import CalibratedModel, nominal_flange_poses
+from truepath.networks_along import NetworksAlong
 from truepath.region import Region
 
 MAX_CORRECTION_MM = 5.0
@@ -18,6 +20,7 @@ MAX_JOINT_CORRECTION_RAD = 0.15
 MAX_JUMP_RAD = 0.02
 LIMIT_ROUNDING_RAD = 1e-9  # a limit written with few decimals is still that limit
 NEAR_SINGULAR = 0.03
+WEIGHT_DIGITS = 6
 CHUNK = 20_000
 FORWARD_TOLERANCE_M, FORWARD_TOLERANCE_RAD = 1e-6, 1e-6
 
@@ -31,6 +34,7 @@ class Correction:
         displacement_mm: ``(N,)`` how far each commanded flange position moved, in nominal kinematics.
         error_before_mm, error_after_mm: ``(N,)`` predicted distance of the tool point from where it should be.
         outside: ``(N,)`` True where the calibration data did not reach.
+        networks: how far they differ, and where they are faded; None where the calibration has none.
         warnings: plain sentences for the user.
     """
 
@@ -39,9 +43,10 @@ class Correction:
     error_before_mm: Array
     error_after_mm: Array
     outside: Array
+    networks: NetworksAlong | None = None
     warnings: list[str] = field(default_factory=list)
 
-    def summary(self) -> dict:
+    def summary(self) -> dict[str, Any]:
         """What a machine wants to know, as plain JSON types."""
 
         def statistics(values: Array) -> dict[str, float]:
@@ -54,6 +59,7 @@ class Correction:
             "predicted_error_before_mm": statistics(self.error_before_mm),
             "predicted_error_after_mm": statistics(self.error_after_mm),
             "outside_calibrated_region": int(self.outside.sum()),
+            "network": None if self.networks is None else _network(self.networks),
             "warnings": self.warnings,
         }
 
@@ -125,13 +131,15 @@ def correct(
             found=f"{displacement_mm[k]:.3f} mm here, up to {displacement_mm.max():.3f} mm in the whole path",
         )
     outside = np.zeros(len(q_rad), bool) if region is None else ~region.contains(q_rad)
+    networks = None if model.residual is None else NetworksAlong.of(model.residual, solution_q)
     return Correction(
         q_rad=solution_q,
         displacement_mm=displacement_mm,
         error_before_mm=before,
         error_after_mm=after,
         outside=outside,
-        warnings=_warnings(outside, singular, line),
+        networks=networks,
+        warnings=_warnings(outside, networks, singular, line),
     )
 
 
@@ -190,7 +198,17 @@ def _refuse_jumps(programmed: Array, corrected: Array, names: tuple[str, ...], l
         )
 
 
-def _warnings(outside: Array, singular: Array, line: Array) -> list[str]:
+def _network(networks: NetworksAlong) -> dict[str, Any]:
+    spread = networks.spoken_mm
+    return {
+        "spread_mm": {"mean": float(spread.mean()), "max": float(spread.max())} if len(spread) else None,
+        "faded_partly": int((networks.faded & ~networks.silent).sum()),
+        "faded_out": int(networks.silent.sum()),
+        "weight": networks.weight.round(WEIGHT_DIGITS).tolist(),
+    }
+
+
+def _warnings(outside: Array, networks: NetworksAlong | None, singular: Array, line: Array) -> list[str]:
     warnings = []
     if outside.any():
         warnings.append(
@@ -198,6 +216,8 @@ def _warnings(outside: Array, singular: Array, line: Array) -> list[str]:
             f"(first in line {int(line[np.argmax(outside)])}): there the kinematics is extrapolated, and named effects "
             "fade out joint by joint"
         )
+    if networks is not None and networks.faded.any():
+        warnings.append(_where_faded(networks, line))
     near = singular < NEAR_SINGULAR
     if near.any():
         warnings.append(
@@ -205,3 +225,15 @@ def _warnings(outside: Array, singular: Array, line: Array) -> list[str]:
             f"smallest singular value {singular.min():.3g}): small errors need large joint motions there"
         )
     return warnings
+
+
+def _where_faded(networks: NetworksAlong, line: Array) -> str:
+    count, out = int(networks.faded.sum()), int(networks.silent.sum())
+    where = f"at {count} of {len(line)} waypoints (first in line {int(line[np.argmax(networks.faded)])})"
+    fact = f"the networks are faded {where}" + (f", at {out} of them to nothing" if out else "")
+    corrected = "corrected in part only"
+    if out == count:
+        fact, corrected = f"the networks are faded out {where}", "not corrected"
+    elif out:
+        corrected = "corrected in part or not at all"
+    return f"{fact}: too few poses were measured near these, and what only the networks know is {corrected} there"

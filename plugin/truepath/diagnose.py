@@ -81,7 +81,7 @@ def diagnose(
         kinematic = replace(kinematic, context=context.subset(looked_at))
     except CalibrationError:
         whole = fit_kinematics(robot, measurements, context)  # says what is wrong, or that a fifth less is too little
-        return _too_few(whole, source)
+        return _too_few(whole, source, network)
     evidence = gather(kinematic, measurements.subset(looked_at).groups(), progress)
     progress("measuring the gain on poses kept away")
     trial = UnseenPoses(kinematic, evidence, measurements, context, unseen)
@@ -216,7 +216,7 @@ def _some(rows: Array, count: int) -> Array:
     return np.sort(np.random.default_rng(0).permutation(rows)[:count])
 
 
-def _too_few(whole: KinematicFit, source: str) -> Diagnosis:
+def _too_few(whole: KinematicFit, source: str, network: Options | None) -> Diagnosis:
     """The data just carries the kinematics."""
     fit: Fit = finish(whole, fit_effects(whole.fit, whole.context, ()))
     measurements = whole.measurements
@@ -225,4 +225,9 @@ def _too_few(whole: KinematicFit, source: str) -> Diagnosis:
     calibration = describe(whole.robot, measurements, fit, source, None)
     told = "Too few poses to keep some away: the kinematics was fitted, and no cause can be named."
     models = {"kinematic": fit.model, "final": fit.model}
-    return Diagnosis(told, measurements, calibration, fit, fit.outlier, unseen, (), (), (), p, (), models)
+    diagnosis = Diagnosis(told, measurements, calibration, fit, fit.outlier, unseen, (), (), (), p, (), models)
+    if network is None:
+        return diagnosis
+    from truepath.residual.decision import impossible
+
+    return replace(diagnosis, network=impossible())

@@ -16,6 +16,7 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from truepath.errors import CalibrationError
 from truepath.lie import Array
 
+ROUNDING = 1e-14
 MAX_ITERATIONS = 30
 SETTLED = 0.05  # relative change of every size that matters
 IRRELEVANT = 0.05  # of its plausible size: whatever such a group still does, it does not matter
@@ -156,7 +157,9 @@ def _solve(problem: LinearProblem, precision: Array, sigma: list[float]) -> tupl
 
 
 def _squares(problem: LinearProblem, kind: int, x: Array) -> float:
-    return max(problem.yy[kind] - 2.0 * float(problem.g[kind] @ x) + float(x @ problem.H[kind] @ x), 1e-300)
+    # A difference of numbers as large as yy is not known better than they are rounded.
+    left = problem.yy[kind] - 2.0 * float(problem.g[kind] @ x) + float(x @ problem.H[kind] @ x)
+    return max(left, ROUNDING * problem.yy[kind], 1e-300)
 
 
 def _noise(problem: LinearProblem, kind: int, x: Array, covariance: Array, sigma: float) -> float:

@@ -160,7 +160,13 @@ def with_network(
 
     samples = Samples.of(fit.model, measurements, context).subset(~fit.outlier)
     residual = learn_ensemble(samples, options, "learning the network from all poses", progress)
-    return replace(fit, model=replace(fit.model, residual=residual))
+    left = samples.less(residual.shift(samples.q_rad)).miss
+    return replace(
+        fit,
+        model=replace(fit.model, residual=residual),
+        sigma_position_m=float(np.sqrt(np.mean(left[:, :3] ** 2))),
+        sigma_orientation_rad=float(np.sqrt(np.mean(left[:, 3:] ** 2))) if left.shape[1] > 3 else None,
+    )
 
 
 def _decide(

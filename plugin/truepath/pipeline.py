@@ -77,6 +77,9 @@ def networks(residual: str, device: str, seed: int, checkpoint: Path | None, *ot
         return
     from truepath.residual.checkpoint import Checkpoint
 
+    # Not only what is there already: when all is done the checkpoint is deleted.
+    if checkpoint.resolve() in {path.resolve() for path in others}:
+        raise InputError("the checkpoint is another file of this run", file=checkpoint, expected="a file of its own")
     keep(checkpoint, *others)
     desk = Checkpoint(checkpoint)
     try:

@@ -22,7 +22,8 @@ from truepath.robust_fit import RobustFit
 from truepath.term_set import TermSet
 
 WORTH_A_LOOK = 0.05  # probability of a group's score by chance, above which it is not even tried
-FEW_FORMS, MANY_GROUPS, MOST_PURSUED = 2, 60, 40
+FEW_FORMS, MANY_GROUPS, MOST_PURSUED = 3, 60, 40
+AS_GOOD = 0.99  # of the evidence of the best form: one of fewer parameters comes first
 LENIENT = 5.0
 INVISIBLE = 1e-6  # share of a column's square that must be left when the kinematics is taken out
 
@@ -154,9 +155,11 @@ class Search:
         return float(np.sum(np.maximum(0.5 * (chi2 - dof * np.log(self.left.size)), 0.0))) + 1e-3 * float(chi2.sum())
 
     def trial(self, effect: Effect) -> Trial:
-        """What an effect would bring."""
+        """What an effect would bring, in its best form; in the simplest of those that are as good."""
         trials = [self._try(effect, form) for form in self.best_forms(effect)]
-        return max(trials, key=lambda trial: trial.gain, default=Trial(effect.name))
+        best = max(trials, key=lambda trial: trial.gain, default=Trial(effect.name))
+        as_good = [trial for trial in trials if best.gain > 0 and trial.gain >= AS_GOOD * best.gain]
+        return min(as_good, key=lambda trial: (trial.num_parameters, -trial.gain), default=best)
 
     def _try(self, effect: Effect, form: TermSet) -> Trial:
         # A first look without the effects in the model taken out, which is quick; then a good one.

@@ -54,8 +54,13 @@ def summary(fitted: FittedTerm, context: Context, robot: NominalRobot) -> str:
         )
     if "tau_s" in constants:
         text += f", time constant about {constants['tau_s']:.3g} s"
-    waves = _strongest_waves(fitted)
-    return f"{text}, mostly {waves}" if waves else text
+    polynomials = np.array([parameter.name.startswith("chebyshev ") for parameter in term.parameters])
+    if polynomials.any():
+        text += ", smooth over the measured range"
+    waves = _strongest_waves(fitted, ~polynomials)
+    if not waves:
+        return text
+    return f"{text}, and {waves}" if polynomials.any() else f"{text}, mostly {waves}"
 
 
 def _moved(fitted: FittedTerm, motion: Array) -> str:
@@ -75,11 +80,12 @@ def _moved(fitted: FittedTerm, motion: Array) -> str:
     return f"{' and '.join(parts) or 'nothing'} {how}"
 
 
-def _strongest_waves(fitted: FittedTerm) -> str:
-    """``1 and 12 cycles per turn``, for effects that are made of waves."""
+def _strongest_waves(fitted: FittedTerm, own: Array) -> str:
+    """``1 and 12 cycles per turn``, for effects that are made of waves; those parameters with ``own`` ``(k,)`` True."""
     power: dict[float, float] = {}
     constants = dict(fitted.term.constants)
-    for parameter, value in zip(fitted.term.parameters, fitted.values, strict=True):
+    parameters = [parameter for parameter, its_own in zip(fitted.term.parameters, own, strict=True) if its_own]
+    for parameter, value in zip(parameters, fitted.values[own], strict=True):
         kind, _, order = parameter.name.rpartition(" ")
         if kind.endswith(("cos", "sin")):
             cycles = float(order)
@@ -88,7 +94,7 @@ def _strongest_waves(fitted: FittedTerm) -> str:
         else:
             return ""
         power[cycles] = power.get(cycles, 0.0) + float(value) ** 2
-    if len(power) < 2:
+    if len(power) < (2 if own.all() else 1):  # a single wave without polynomials has said its name already
         return ""
     ranked = sorted(power, key=lambda cycles: -power[cycles])[:MOST_CYCLES]
     strong = sorted(cycles for cycles in ranked if power[cycles] > 0.15 * power[ranked[0]])

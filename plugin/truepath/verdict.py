@@ -24,6 +24,7 @@ def verdict(diagnosis: Diagnosis) -> str:
         text += "; what is left has a pattern that no known cause carries"
     else:
         text += f"; what is left looks like noise, of which {floor:.3f} mm are expected"
+    text += _networks(diagnosis)
     real = [item for item in diagnosis.ambiguous if "measurement_scale" not in item.effects]
     if real:
         groups = [
@@ -32,6 +33,17 @@ def verdict(diagnosis: Diagnosis) -> str:
         ]
         text += f"; these data do not tell {'; nor '.join(groups)}"
     return text + "."
+
+
+def _networks(diagnosis: Diagnosis) -> str:
+    """What became of them, where they were asked for."""
+    network = diagnosis.network
+    if network is None:
+        return ""
+    if network.model is None or network.gain is None:
+        return "; networks are left out, as nothing proves that they would help"
+    before, after = network.gain.before_mm, network.gain.after_mm
+    return f"; networks for what has no name take the mean error from {before:.3f} to {after:.3f} mm"
 
 
 def not_testable(robot: NominalRobot, context: Context) -> list[NotTestable]:

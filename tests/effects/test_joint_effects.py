@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.polynomial import chebyshev
 from truepath.context import Context
 from truepath.effects import EFFECTS, joint_errors
 from truepath.effects.base import FittedTerm, basis
@@ -89,11 +90,18 @@ def test_every_wave_of_every_form_is_the_one_that_its_name_says(ur5):
         for term in form[:2]:
             theta = q[:, term.joint - 1]
             share = (theta - theta.min()) / np.ptp(theta)
+            x = (2 * theta - term.constant("lower_rad") - term.constant("upper_rad")) / (
+                term.constant("upper_rad") - term.constant("lower_rad")
+            )
             found = basis(EFFECTS["transmission_error"], term, ur5, Context(q))[:, 0]
             for j, parameter in enumerate(term.parameters):
                 kind, order = parameter.name.split(" ")
-                waves = {"cos": np.cos(int(order) * theta), "sin": np.sin(int(order) * theta)}
-                expected = waves.get(kind, np.cos(np.pi * int(order) * share))
+                expected = {
+                    "cos": np.cos(int(order) * theta),
+                    "sin": np.sin(int(order) * theta),
+                    "half-wave": np.cos(np.pi * int(order) * share),
+                    "chebyshev": chebyshev.chebval(x, np.eye(int(order) + 1)[int(order)]),
+                }[kind]
                 np.testing.assert_allclose(found[:, j], expected, atol=1e-11)
 
 

@@ -5,28 +5,14 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import lxml.html
 import made_up
 import matplotlib
 import pytest
+from reading import SECTIONS, text_of, tree_of
 from truepath.effects.outlier import EFFECT as OUTLIER
 from truepath.errors import InputError
 from truepath.report import write_report
 from truepath.report.page import render
-
-SECTIONS = ["accuracy", "findings", "left", "doubts", "residuals", "data", "parameters", "reading"]
-
-
-def tree_of(page):
-    return lxml.html.document_fromstring(page)
-
-
-def text_of(page, place="body"):
-    """What a reader reads in an element, with single spaces."""
-    element = tree_of(page).xpath("//body" if place == "body" else f"//*[@id='{place}']")[0]
-    for script in element.xpath(".//script|.//svg"):
-        script.drop_tree()
-    return " ".join(element.text_content().split())
 
 
 class TestItStandsAlone:

@@ -18,6 +18,7 @@ from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
+from truepath.networks_along import NetworksAlong
 from truepath.preview.arm import read_arm
 from truepath.preview.page import PageText, render
 from truepath.preview.scene import record_scene
@@ -38,6 +39,7 @@ class PreviewSummary:
         magnification: factor by which errors are drawn.
         key_frames: of the animation; 1 where nothing moves.
         missing_meshes: files that the robot model names and that could not be read; they are not drawn.
+        networks: what they say at the waypoints; None where the calibration has none.
     """
 
     output: Path
@@ -48,6 +50,7 @@ class PreviewSummary:
     magnification: float
     key_frames: int
     missing_meshes: tuple[str, ...]
+    networks: NetworksAlong | None = None
 
 
 def write_preview(
@@ -88,11 +91,13 @@ def write_preview(
     arm = read_arm(robot_source, robot, calibration.robot.name)
 
     outside = np.logical_not(calibration.region.region().contains(q_programmed))
-    paths = Toolpaths.of(calibration.model, q_programmed, q_corrected)
+    model = calibration.model
+    networks = None if model.residual is None else NetworksAlong.of(model.residual, q_corrected)
+    paths = Toolpaths.of(model, q_programmed, q_corrected)
     uncorrected, corrected = (ErrorStatistics.of(errors) for errors in paths.errors_mm())
     factor = nice_magnification(paths) if magnification == "auto" else _require_magnification(magnification)
-    frames = animate(calibration.model, q_programmed, q_corrected, factor)
-    recorded = record_scene(arm, calibration.model, q_programmed, q_corrected, outside, frames, factor)
+    frames = animate(model, q_programmed, q_corrected, factor)
+    recorded = record_scene(arm, model, q_programmed, q_corrected, outside, frames, factor)
     text = PageText(
         title=title,
         robot=calibration.robot.name,
@@ -104,6 +109,7 @@ def write_preview(
         corrected=corrected,
         model_error=None if calibration.heldout is None else calibration.heldout.calibrated.position_mm,
         missing_meshes=arm.missing_meshes,
+        networks=networks,
     )
     write_atomically(output, render(text, recorded, frames, labels))
     return PreviewSummary(
@@ -115,6 +121,7 @@ def write_preview(
         magnification=factor,
         key_frames=len(frames.time_s),
         missing_meshes=arm.missing_meshes,
+        networks=networks,
     )
 
 

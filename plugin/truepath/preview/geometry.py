@@ -24,19 +24,20 @@ def rod(start: Array, end: Array, radius_m: float) -> tuple[mg.Cylinder, Array]:
 
 
 def tube(
-    points: Array, radius_m: float, colours: Array | None = None, sides: int = 6
+    points: Array, radius_m: float | Array, colours: Array | None = None, sides: int = 6
 ) -> mg.TriangularMeshGeometry | None:
     """A line that can be seen: a tube along the points.
 
     Args:
         points: ``(K, 3)``; neighbours that coincide count once.
-        radius_m: half its width.
+        radius_m: half its width; ``(K,)`` if it varies: where it is zero there is nothing to see.
         colours: ``(K, 3)`` red, green, blue from 0 to 1.
 
     Returns:
         None where all points coincide.
     """
     keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > COINCIDENT_M)
+    radius = np.broadcast_to(radius_m, len(points))[keep]
     points = points[keep]
     K = len(points)
     if K < 2:
@@ -45,7 +46,7 @@ def tube(
     normals = _parallel_normals(points)
     binormals = np.cross(_tangents(points), normals)
     ring = np.cos(angle)[:, None] * normals[:, None] + np.sin(angle)[:, None] * binormals[:, None]
-    vertices = (points[:, None] + radius_m * ring).reshape(-1, 3)
+    vertices = (points[:, None] + radius[:, None, None] * ring).reshape(-1, 3)
     a = np.arange((K - 1) * sides)
     b = a - a % sides + (a + 1) % sides
     walls = np.concatenate([np.stack([a, b, a + sides], axis=1), np.stack([b, b + sides, a + sides], axis=1)])

@@ -15,6 +15,7 @@ import numpy as np
 
 from truepath.calibration_parts import StatisticsPart
 from truepath.iso9283 import ErrorStatistics
+from truepath.networks_along import NetworksAlong
 from truepath.preview import scene
 from truepath.preview.toolpaths import KeyFrames
 
@@ -30,6 +31,7 @@ class PageText:
         uncorrected, corrected: predicted errors at the waypoints, mm.
         model_error: errors of the calibrated model itself on poses it had not seen, mm; None if unknown.
         missing_meshes: what could not be drawn.
+        networks: what they say at the waypoints; None where the calibration has none.
     """
 
     title: str
@@ -42,6 +44,7 @@ class PageText:
     corrected: ErrorStatistics
     model_error: StatisticsPart | None
     missing_meshes: tuple[str, ...]
+    networks: NetworksAlong | None = None
 
 
 def render(text: PageText, recorded: scene.RecordedScene, frames: KeyFrames, labels: Sequence[str] | None) -> str:
@@ -98,6 +101,9 @@ def _panel(text: PageText) -> str:
         _entry("arm", "#c9cdd2", 1, "Robot on the corrected path", "", scene.ARM),
         _entry("arm", scene.UNCORRECTED, 0.35, "Robot without correction", drawn, scene.GHOST),
     ]
+    if text.networks is not None and text.networks.faded.any():
+        name, how = "Networks faded", "the wider, the less they correct"
+        legend.insert(1, _entry("sleeve", scene.FADED, 0.75, name, how, scene.PATH_FADED))
     if text.outside:
         swatch = f'<span class="band" style="background:{scene.OUTSIDE};opacity:.6"></span>'
         legend.insert(1, f"<li><label>{swatch}<span>Outside the calibrated region</span></label></li>")
@@ -141,6 +147,8 @@ def _notes(text: PageText) -> list[tuple[str, str]]:
         notes = [(" warning", beyond)]
     else:
         notes = [("", f"{where}: none of {text.waypoints}.")]
+    if text.networks is not None:
+        notes += _network_notes(text.networks)
     predicted = "Errors are what the calibrated model predicts."
     if text.model_error is not None:
         predicted += (
@@ -151,6 +159,21 @@ def _notes(text: PageText) -> list[tuple[str, str]]:
     notes.append(("", "Robot base frame: x red, y green, z blue. Grid 100 mm."))
     if text.missing_meshes:
         notes.append((" warning", "Not drawn, file not readable: " + ", ".join(text.missing_meshes)))
+    return notes
+
+
+def _network_notes(networks: NetworksAlong) -> list[tuple[str, str]]:
+    total, faded, silent = len(networks.weight), int(networks.faded.sum()), int(networks.silent.sum())
+    where = "Waypoints where the networks are faded"
+    if not faded:
+        notes = [("", f"{where}: none of {total}.")]
+    else:
+        how = f"{where}: {faded} of {total}" + (f", to nothing at {silent}" if silent else "")
+        corrected = "not corrected" if silent == faded else "corrected in part" + (" or not at all" if silent else "")
+        notes = [(" warning", f"{how}. There what only they know is {corrected}.")]
+    if silent < total:
+        spread = networks.spoken_mm
+        notes.append(("", f"Spread of the networks: {spread.mean():.3f} mm (mean), {spread.max():.3f} mm (max)."))
     return notes
 
 

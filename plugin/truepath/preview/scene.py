@@ -18,12 +18,13 @@ from meshcat.visualizer import Visualizer
 from truepath import lie
 from truepath.lie import Array
 from truepath.model import CalibratedModel
+from truepath.networks_along import NetworksAlong
 from truepath.preview.arm import Arm, Rgba
 from truepath.preview.geometry import grid_lines, line_segments, rod, tube
 from truepath.preview.toolpaths import KeyFrames, Toolpaths, fine_positions, interpolate, thin_out
 from truepath.robot import rotation_about_axis
 
-PROGRAMMED, UNCORRECTED, CORRECTED, OUTSIDE = "#3a3a3a", "#d55e00", "#0072b2", "#e69f00"
+PROGRAMMED, UNCORRECTED, CORRECTED, OUTSIDE, FADED = "#3a3a3a", "#d55e00", "#0072b2", "#e69f00", "#cc79a7"
 AXES = ("#c0392b", "#2e8b57", "#2c5fa8")  # x, y, z as everybody draws them
 GRID_COLOUR = "#b9c0c8"
 SKY, HORIZON = (1.0, 1.0, 1.0), (0.86, 0.89, 0.92)
@@ -32,11 +33,14 @@ GRID_CELL_M = 0.1
 MOST_ERROR_LINES = 66
 VIEW_POSTURES = 60
 VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD = np.radians(-55.0), np.radians(24.0)  # azimuth from where the path lies
+FAR_WALLS_ONLY = {"side": 1, "depthWrite": False}  # 1: back side, of three.js; what is within shows
 SHARED_BYTES = 200  # geometries from this size on are stored once, however often they are used
 
 ROOT = "truepath"
 ARM, GHOST, ERROR_LINES = "arm_corrected", "arm_uncorrected", "error_lines"
 PATH_PROGRAMMED, PATH_UNCORRECTED, PATH_CORRECTED = "path_programmed", "path_uncorrected", "path_corrected"
+PATH_FADED = "path_faded"
+BAND, SLEEVE_LEAST, SLEEVE_MOST = 2.8, 4.0, 6.5  # half widths, in those of a line
 
 
 @dataclass
@@ -112,6 +116,8 @@ def record_scene(
     size = max(float(np.linalg.norm(bodies, axis=1).max()), 0.1)
 
     scene.surroundings(size)
+    if model.residual is not None:  # before the paths: what is transparent is drawn in the order in which it came
+        scene.sleeve(paths.goal, NetworksAlong.of(model.residual, q_fine[1]), 0.002 * size)
     scene.paths(paths, outside[np.round(position).astype(int)], 0.002 * size)
     scene.error_lines(Toolpaths.of(model, q_programmed, q_corrected).magnified(magnification))
     solid, ghost = scene.root[ARM], scene.root[GHOST]
@@ -177,16 +183,26 @@ class _Scene:
     def paths(self, paths: Toolpaths, outside: Array, radius: float) -> None:
         """The three lines. The programmed one is a wide pale band, so that the corrected one shows inside it."""
         shades = np.where(outside[:, None], _unit_rgb(OUTSIDE), _unit_rgb(PROGRAMMED))
-        far_walls_only = {"side": 1, "depthWrite": False}  # 1: back side, of three.js
-        band = self.material(mg.MeshBasicMaterial, 0xFFFFFF, vertexColors=True, opacity=0.5, **far_walls_only)
-        self.line(PATH_PROGRAMMED, paths.goal, 2.8 * radius, band, shades)
+        band = self.material(mg.MeshBasicMaterial, 0xFFFFFF, vertexColors=True, opacity=0.5, **FAR_WALLS_ONLY)
+        self.line(PATH_PROGRAMMED, paths.goal, BAND * radius, band, shades)
         self.line(PATH_UNCORRECTED, paths.uncorrected, radius, self.bright(UNCORRECTED))
         self.line(PATH_CORRECTED, paths.corrected, radius, self.bright(CORRECTED))
 
-    def line(self, name: str, points: Array, radius: float, material: mg.Material, shades: Array | None = None) -> None:
-        """A tube through points ``(K, 3)``, each with its own shade ``(K, 3)`` if so wished."""
+    def sleeve(self, points: Array, networks: NetworksAlong, radius: float) -> None:
+        """Around the programmed line ``(K, 3)``: the wider, the more the networks are faded there; else none."""
+        half_width = SLEEVE_LEAST + (SLEEVE_MOST - SLEEVE_LEAST) * (1.0 - networks.weight)
+        if networks.faded.any():
+            material = self.material(mg.MeshBasicMaterial, _rgb(FADED), opacity=0.75, **FAR_WALLS_ONLY)
+            self.line(PATH_FADED, points, radius * np.where(networks.faded, half_width, 0.0), material)
+
+    def line(
+        self, name: str, points: Array, radius: float | Array, material: mg.Material, shades: Array | None = None
+    ) -> None:
+        """A tube through points ``(K, 3)``, each with its own shade ``(K, 3)`` and radius ``(K,)`` if so wished."""
         kept = thin_out(points)
-        geometry = tube(points[kept], radius, None if shades is None else shades[kept])
+        geometry = tube(
+            points[kept], np.broadcast_to(radius, len(points))[kept], None if shades is None else shades[kept]
+        )
         if geometry is not None:  # a path that stays in one point has no line; the arms show it
             self.put(self.root[name], mg.Mesh(geometry, material))
 

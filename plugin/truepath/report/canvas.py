@@ -18,8 +18,8 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from truepath.lie import Array
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
-NOMINAL, BEFORE, AFTER, NOISE = "#6b7580", "#d55e00", "#0072b2", "#009e73"
-PALE = {BEFORE: "#efb48a", AFTER: "#6fb0d8", NOMINAL: "#aab2ba"}
+NOMINAL, BEFORE, AFTER, NOISE, NETWORK = "#6b7580", "#d55e00", "#0072b2", "#009e73", "#cc79a7"
+PALE = {BEFORE: "#efb48a", AFTER: "#6fb0d8", NOMINAL: "#aab2ba", NETWORK: "#e5bcd3"}
 INK, MUTED, GRID = "#1c232b", "#56616d", "#e3e7eb"
 TEXT_SIZE = 10.0
 UNITS_PER_INCH = 72.0  # of the drawing; shown at its natural width, one is a CSS pixel

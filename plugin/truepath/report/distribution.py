@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.ticker import LogLocator
 
 from truepath.report.canvas import NOISE, new_axes, write_svg
-from truepath.report.drawn import COLOURS, STAGE_NAMES, Drawn, Plot
+from truepath.report.drawn import COLOURS, NETWORK_STAGE, STAGE_NAMES, Drawn, Plot
 from truepath.report.words import significant
 
-DASHES = {"nominal": (0, (1, 1)), "kinematic": (0, (5, 2)), "final": "solid"}
+DASHES = {"nominal": (0, (1, 1)), "kinematic": (0, (5, 2)), "final": "solid", "network": (0, (6, 2, 1.5, 2))}
 KINDS = (("Position", "mm", 0), ("Orientation", "mrad", 3))
 
 
@@ -17,7 +17,7 @@ def distributions(drawn: Drawn, noise_floor_mm: float) -> list[Plot]:
     """Share of unseen poses with a smaller error, for position and, where measured, orientation."""
     plots = []
     for kind, unit, first in KINDS:
-        stages = [stage for stage in ("nominal", *drawn.stages) if stage in drawn.error_B]
+        stages = [stage for stage in ("nominal", *drawn.stages, NETWORK_STAGE) if stage in drawn.error_B]
         if not stages or not drawn.unseen.any() or drawn.error_B[stages[0]].shape[1] <= first:
             continue
         floor = noise_floor_mm if first == 0 else None

@@ -9,12 +9,13 @@ import numpy as np
 from truepath import lie
 from truepath.diagnosis import Diagnosis
 from truepath.lie import Array
-from truepath.report.canvas import AFTER, BEFORE, NOMINAL, PALE
+from truepath.report.canvas import AFTER, BEFORE, NETWORK, NOMINAL, PALE
 
-BEFORE_STAGE, AFTER_STAGE = "kinematic", "final"
-COLOURS = {"nominal": NOMINAL, BEFORE_STAGE: BEFORE, AFTER_STAGE: AFTER}
+BEFORE_STAGE, AFTER_STAGE, NETWORK_STAGE = "kinematic", "final", "network"
+COLOURS = {"nominal": NOMINAL, BEFORE_STAGE: BEFORE, AFTER_STAGE: AFTER, NETWORK_STAGE: NETWORK}
 PALE_COLOURS = {stage: PALE[colour] for stage, colour in COLOURS.items()}
 STAGE_NAMES = {"nominal": "nominal model", BEFORE_STAGE: "kinematic model", AFTER_STAGE: "final model"}
+STAGE_NAMES[NETWORK_STAGE] = "with networks"
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class Drawn:
         row: ``(K,)`` number of the pose, from 1.
         group: ``(K,)`` equal for visits of one pose.
         time_s, temperature_c: ``(K,)`` or None.
-        error_B: by stage ``(K, 3)`` or ``(K, 6)`` predicted less measured along the axes of B, mm and mrad.
+        error_B: by stage ``(K, 3)`` or ``(K, 6)`` predicted less measured along the axes of B, mm and mrad; also by
+            ``network``, where networks are in the model.
         joint_view_urad: by stage ``(K, n)``; NaN where a joint says nothing.
         stages: those of ``kinematic`` and ``final`` that differ: one where nothing was found.
     """
@@ -66,11 +68,7 @@ class Drawn:
             group=measurements.groups()[kept],
             time_s=None if measurements.time_s is None else measurements.time_s[kept],
             temperature_c=None if measurements.temperature_c is None else measurements.temperature_c[kept],
-            error_B={
-                stage: 1e3 * _turned(X_BM[:3, :3], np.asarray(error))[kept]
-                for stage, error in diagnosis.residuals.items()
-                if stage in COLOURS
-            },
+            error_B=_errors(diagnosis, X_BM[:3, :3], kept),
             joint_view_urad={stage: 1e6 * np.asarray(view)[kept] for stage, view in diagnosis.joint_view.items()},
             stages=tuple(stage for stage in wanted if stage in diagnosis.residuals),
         )
@@ -87,6 +85,19 @@ class Drawn:
         count = np.bincount(group)[:, None]
         means = np.stack([np.bincount(group, errors[:, k]) for k in range(3)], axis=1) / count
         return np.linalg.norm(means, axis=1)
+
+
+def _errors(diagnosis: Diagnosis, R_BM: Array, kept: Array) -> dict[str, Array]:
+    errors = {
+        stage: 1e3 * _turned(R_BM, np.asarray(error))[kept]
+        for stage, error in diagnosis.residuals.items()
+        if stage in COLOURS
+    }
+    model = None if diagnosis.network is None else diagnosis.network.model
+    if model is not None and model.residual is not None:
+        shift = 1e3 * model.residual.shift(diagnosis.measurements.q_rad[kept])
+        errors[NETWORK_STAGE] = errors[AFTER_STAGE] + shift[:, : errors[AFTER_STAGE].shape[1]]
+    return errors
 
 
 def _turned(R: Array, errors: Array) -> Array:

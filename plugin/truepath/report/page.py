@@ -13,6 +13,7 @@ from truepath.diagnosis import Diagnosis
 from truepath.report import sections, stage_strip
 from truepath.report.distribution import distributions
 from truepath.report.drawn import Drawn, Plot
+from truepath.report.network import network_card
 from truepath.report.residual_plots import over_joints, over_temperature, over_time
 from truepath.report.spectrum import spectra
 from truepath.report.workspace import error_vectors
@@ -44,6 +45,7 @@ def render(diagnosis: Diagnosis) -> str:
         something_found=len(drawn.stages) > 1,
         has_rings=bool(drawn.unseen.any()),
         findings=sections.findings(diagnosis, drawn),
+        network=network_card(diagnosis, drawn),
         over_joints=over_joints(drawn, joint_names),
         over_time=over_time(drawn),
         has_clock=drawn.time_s is not None,

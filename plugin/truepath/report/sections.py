@@ -18,11 +18,13 @@ from truepath.report.words import (
     effect_name,
     in_readable_unit,
     inside_sentence,
+    interval,
     joints_phrase,
     listed,
     millimetres_decimals,
     odds,
     probability,
+    sentence,
     significant,
     with_sign,
 )
@@ -112,22 +114,21 @@ def findings(diagnosis: Diagnosis, drawn: Drawn) -> list[FindingCard]:
 def _card(diagnosis: Diagnosis, drawn: Drawn, finding: Finding, number: int) -> FindingCard:
     gain = finding.gain
     decimals = millimetres_decimals(min(gain.before_mm, gain.after_mm))
-    low, high = sorted(gain.ci95_mm)
     return FindingCard(
         identity=f"finding-{number}",
         effect=finding.effect,
         title=effect_name(finding.effect),
         place=joints_phrase(finding.joints),
-        cause=_sentence(finding.cause),
-        remedy=_sentence(finding.remedy),
+        cause=sentence(finding.cause),
+        remedy=sentence(finding.remedy),
         summary=finding.summary,
         probability=probability(finding.p_value),
         odds=odds(finding.log_odds),
         before=f"{gain.before_mm:.{decimals}f}",
         after=f"{gain.after_mm:.{decimals}f}",
         gain=with_sign(f"{gain.before_mm - gain.after_mm:.{decimals}f}"),
-        interval=with_sign(f"{low:.{decimals}f}") + " to " + with_sign(f"{high:.{decimals}f}"),
-        is_sure=low > 0,
+        interval=interval(gain.ci95_mm, decimals),
+        is_sure=min(gain.ci95_mm) > 0,
         plots=of_finding(drawn, diagnosis, finding, number),
         parameters=[_found_row(parameter) for parameter in finding.parameters],
     )
@@ -137,7 +138,7 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
     """What is left."""
     left = diagnosis.unexplained
     if not (math.isfinite(left.heldout_mm) and math.isfinite(left.noise_floor_mm)):
-        return {"known": False, "structured": left.structured, "hints": [_sentence(hint) for hint in left.hints]}
+        return {"known": False, "structured": left.structured, "hints": [sentence(hint) for hint in left.hints]}
     decimals = millimetres_decimals(min(left.heldout_mm, left.noise_floor_mm))
     source = {"repeats": "repeated visits of the same poses", "neighbours": "differences between neighbouring poses"}
     return {
@@ -148,7 +149,7 @@ def unexplained(diagnosis: Diagnosis) -> dict[str, Any]:
         "floor": f"{left.noise_floor_mm:.{decimals}f}",
         "ratio": significant(left.heldout_mm / left.noise_floor_mm, 2) if left.noise_floor_mm > 0 else None,
         "floor_from": source.get(left.floor_from, left.floor_from),
-        "hints": [_sentence(hint) for hint in left.hints],
+        "hints": [sentence(hint) for hint in left.hints],
     }
 
 
@@ -160,7 +161,7 @@ def ambiguous(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         items.append(
             {
                 "title": listed([names[0], *(inside_sentence(name) for name in names[1:])], "or") if names else "",
-                "why": _sentence(item.why),
+                "why": sentence(item.why),
                 "file": item.measure_next,
                 "link": None if item.measure_next is None else "./" + quote(item.measure_next),
                 "poses": None if item.poses is None else counted(len(item.poses), "pose"),
@@ -174,7 +175,7 @@ def not_testable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return [
         {
             "name": effect_name(item.effect),
-            "why": _sentence(item.why),
+            "why": sentence(item.why),
             "columns": [COLUMN_OF_FIELD.get(column, column) for column in item.columns],
         }
         for item in diagnosis.not_testable
@@ -189,8 +190,8 @@ def outliers(diagnosis: Diagnosis) -> dict[str, Any]:
     residual = diagnosis.residuals.get("kinematic")
     length = None if residual is None else 1e3 * np.linalg.norm(np.asarray(residual)[:, :3], axis=1)
     return {
-        "cause": _sentence(EFFECT.cause),
-        "remedy": _sentence(EFFECT.remedy),
+        "cause": sentence(EFFECT.cause),
+        "remedy": sentence(EFFECT.remedy),
         "rows": [
             (int(row) + 1, int(diagnosis.measurements.line[row]), "" if length is None else significant(length[row]))
             for row in rows
@@ -214,11 +215,3 @@ def _kinematic_row(parameter: Parameter) -> ParameterRow:
     joint = "" if parameter.joint is None else str(parameter.joint)
     held = (parameter.reason or "held at nominal") if is_held else None
     return ParameterRow(parameter.name, joint, value, sigma, unit, held)
-
-
-def _sentence(text: str) -> str:
-    """With a capital and a full stop."""
-    text = text.strip()
-    if not text:
-        return text
-    return text[0].upper() + text[1:] + ("" if text[-1] in ".!?" else ".")

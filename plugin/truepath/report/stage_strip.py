@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 from truepath.diagnosis import Diagnosis
 from truepath.iso9283 import ErrorStatistics
-from truepath.report.canvas import AFTER, BEFORE, NOMINAL
+from truepath.report.canvas import AFTER, BEFORE, NETWORK, NOMINAL
 from truepath.report.words import effect_name, inside_sentence, millimetres_decimals
 
 BETWEEN = "#56b4e9"
+WITH_NETWORK = "+network"
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,10 @@ def _strip(found: Sequence[tuple[str, ErrorStatistics]], unit: str, floor: float
         return round(100.0 * min(share, 1.0), 2)
 
     decimals = millimetres_decimals(min(means, default=1.0))
-    last = len(found) - 1
+    last = max(k for k, (model, _) in enumerate(found) if not model.endswith(WITH_NETWORK))
     bars = []
     for k, ((_, errors), name) in enumerate(zip(found, stage_names([model for model, _ in found]), strict=True)):
-        colour = (NOMINAL, BEFORE)[k] if k < 2 else (AFTER if k == last else BETWEEN)
+        colour = (NOMINAL, BEFORE)[k] if k < 2 else (BETWEEN if k < last else AFTER if k == last else NETWORK)
         numbers = (errors.mean, errors.p95, errors.max)
         mean, p95, most = (f"{number:.{decimals}f}" for number in numbers)
         bars.append(Bar(name, colour, mean, p95, most, *map(place, numbers)))

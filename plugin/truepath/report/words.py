@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 EFFECT_NAMES = {
@@ -19,6 +20,7 @@ EFFECT_NAMES = {
     "outlier": "Outlier",
     "unexplained": "Unexplained structure",
     "kinematic": "Geometry of the robot",
+    "network": "Neural residual",
 }
 READABLE_UNITS = {  # SI unit: factor and unit on paper
     "rad": (1e6, "µrad"),
@@ -57,6 +59,14 @@ def listed(words: Sequence[str], conjunction: str = "and") -> str:
     return ", ".join(words[:-1]) + f" {conjunction} {words[-1]}"
 
 
+def sentence(text: str) -> str:
+    """With a capital and a full stop."""
+    text = text.strip()
+    if not text:
+        return text
+    return text[0].upper() + text[1:] + ("" if text[-1] in ".!?" else ".")
+
+
 def counted(number: int, noun: str) -> str:
     """``1 pose``, ``1200 poses``."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
@@ -79,6 +89,11 @@ def with_sign(number: str) -> str:
     if number.startswith("-") and not number.strip("-0."):
         number = number[1:]
     return number.replace("-", "\N{MINUS SIGN}")
+
+
+def with_powers(text: str) -> str:
+    """A text in which ``3e-12`` is written ``3 × 10⁻¹²``."""
+    return re.sub(r"(?<=\d)e(-\d+)", lambda m: f" \N{MULTIPLICATION SIGN} 10{superscript(int(m[1]))}", text)
 
 
 def power_of_ten(value: float) -> str:
@@ -110,6 +125,12 @@ def odds(log_odds: float) -> str:
     else:
         number = f"10{superscript(math.floor(size / math.log(10.0)))}"
     return f"{number} to 1" if log_odds >= 0 else f"1 to {number}"
+
+
+def interval(limits: Sequence[float], decimals: int) -> str:
+    """``0.0049 to 0.0113``."""
+    low, high = sorted(limits)
+    return with_sign(f"{low:.{decimals}f}") + " to " + with_sign(f"{high:.{decimals}f}")
 
 
 def millimetres_decimals(smallest_mm: float) -> int:

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
-from truepath.calibration_parts import Finite, Part
-from truepath.calibration_residual import NetworkPart
+from truepath.calibration_parts import Part
+from truepath.calibration_residual import LARGEST, NetworkPart
 from truepath.errors import InputError
 from truepath.files import write_atomically
 
@@ -34,14 +34,17 @@ MAX_BYTES = 1 << 30
 SECONDS_BETWEEN = 2.0
 
 
+Error = Annotated[float, Field(ge=0, le=LARGEST)]
+
+
 class StatePart(Part):
     """An evolution under way."""
 
     individuals: Annotated[list[NetworkPart], Field(min_length=3)]
-    error: list[Finite]
+    error: list[Error]
     generation: Annotated[int, Field(ge=0)]
     stale: Annotated[int, Field(ge=0)]
-    reference: Finite
+    reference: Error
 
 
 class Content(Part):
@@ -97,8 +100,9 @@ class Checkpoint:
 
         settings, networks = options.evolution, self._fitting(part.individuals, lesson)
         sizes = [network.neurons for network in networks]
-        if len(sizes) != settings.individuals or len(part.error) != len(sizes) or max(sizes) > settings.largest:
-            raise _refused(self.path, "another number of individuals, or larger ones, than this evolution has")
+        complete = len(sizes) == len(part.error) == settings.individuals
+        if not complete or min(sizes) < settings.smallest or max(sizes) > settings.largest:
+            raise _refused(self.path, "individuals in another number or of other size than this evolution has")
         device = torch.device(options.device)
         population = Population.of(networks, settings.largest, device, torch.float32)
         error = torch.tensor(part.error, dtype=torch.float32, device=device)

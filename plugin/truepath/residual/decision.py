@@ -66,7 +66,7 @@ def decide(trial: KeptAway, fit: FitTo, options: Options, progress: Progress = l
     samples = Samples.of(named, trial.measurements, trial.context).subset(trial.seen)
     model = replace(named, residual=learn_ensemble(samples, options, "learning the network", progress))
     gain = trial.gain(named, model)
-    if gain.after_mm >= gain.before_mm:
+    if not gain.after_mm < gain.before_mm:  # in this way round for what is no number
         why = (
             f"left out: on the poses kept away the mean error is {gain.after_mm:.4f} mm with it and "
             f"{gain.before_mm:.4f} mm without"
@@ -84,6 +84,11 @@ def left_out(proof: Proof) -> str:
     """Why a network does not enter."""
     if proof.before_mm == proof.after_mm == 0.0:
         return TOO_FEW
+    if proof.turns_away:
+        return "left out: on poses that it did not learn from, orientations become worse with it"
+    if proof.p_value < SIGNIFICANT:
+        gain_um = 1e3 * (proof.before_mm - proof.after_mm)
+        return f"left out: it would lower the mean error by {gain_um:.2g} um only, which nobody would notice"
     return (
         f"left out: on poses that it did not learn from, the mean error is {proof.after_mm:.4f} mm with it and "
         f"{proof.before_mm:.4f} mm without; p = {proof.p_value:.2g} does not prove a gain (less than {SIGNIFICANT:g} "

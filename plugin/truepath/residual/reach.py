@@ -17,6 +17,7 @@ SHARPNESS = 8.0  # of the soft minimum, over the squared median distance
 NEARLY_ALL = 0.99
 FADES_FROM, FADES_TO = 1.25, 2.0  # times the usual distance to the nearest pose
 DIGITS = 6
+SAME_POSE_DIGITS = 3  # of a joint, rad
 CHUNK = 4096
 
 
@@ -44,6 +45,8 @@ class Reach:
         """The reach of measured joints ``(N, n)``, two poses at least."""
         lower, upper = q_rad.min(axis=0), q_rad.max(axis=0)
         unit = half_range(lower, upper)
+        # Visits of one pose are no neighbours of each other.
+        q_rad = q_rad[np.sort(np.unique(np.round(q_rad, SAME_POSE_DIGITS), axis=0, return_index=True)[1])]
         chosen, distance = _spread_out(q_rad / unit)
         median = max(float(np.median(distance)), 1e-6)
         spacing = max(float(np.quantile(distance, NEARLY_ALL)), 1e-6)

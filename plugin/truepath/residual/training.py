@@ -81,13 +81,17 @@ class _Fit:
         self.weights = torch.tensor(vector, device=device)
         group = np.zeros(len(vector), int)  # of weights that are held small alike
         group[: self.neurons * self.inputs].reshape(self.neurons, -1)[:, -1] = 1
-        group[self.neurons * self.inputs :] = 2
-        group[self.neurons * self.inputs :].reshape(self.outputs, -1)[:, -1] = 3
-        self.group = torch.tensor(group, device=device)
-        self.decay = torch.tensor(
-            [FIRST_DECAY, FIRST_DECAY, FIRST_DECAY, LEAST_DECAY], device=device, dtype=torch.float64
-        )
-        self.precision = 1.0 / max(float(self.target.var()), 1e-300) if self.target.numel() > 1 else 1.0
+        kind = np.arange(self.outputs) // 3  # positions and turns: of one there may be much to learn, of the other none
+        kinds = int(kind[-1]) + 1
+        group[self.neurons * self.inputs :].reshape(self.outputs, -1)[:] = 3 + kind[:, None]
+        group[self.neurons * self.inputs :].reshape(self.outputs, -1)[:, -1] = 2
+        self.group, self.kind = torch.tensor(group, device=device), torch.tensor(kind, device=device)
+        self.decay = torch.full((3 + kinds,), FIRST_DECAY, device=device, dtype=torch.float64)
+        self.decay[2] = LEAST_DECAY  # the thresholds of the outputs are free
+        self.precision = torch.ones(kinds, dtype=torch.float64, device=device)
+        if self.target.numel() > 1:
+            for number in range(kinds):
+                self.precision[number] = 1.0 / max(float(self.target[self.kind == number].var()), 1e-300)
         self.damping = FIRST_DAMPING
 
     def split(self, weights: Tensor) -> tuple[Tensor, Tensor]:
@@ -115,8 +119,8 @@ class _Fit:
         miss, said1 = self.miss(self.weights)
         normal, gradient = self._normal_equations(miss, said1)
         decay = self.decay[self.group]
-        matrix = self.precision * normal + torch.diag(decay)
-        slope = self.precision * gradient + decay * self.weights
+        matrix = normal + torch.diag(decay)
+        slope = gradient + decay * self.weights
         before = self._cost(miss, self.weights, decay)
         scale = torch.diag(matrix)
         for _ in range(MOST_TRIES):
@@ -134,25 +138,30 @@ class _Fit:
         return True
 
     def _cost(self, miss: Tensor, weights: Tensor, decay: Tensor) -> Tensor:
-        return 0.5 * self.precision * miss.square().sum() + 0.5 * (decay * weights.square()).sum()
+        return 0.5 * (self._precision_of_outputs() @ miss.square().sum(1)) + 0.5 * (decay * weights.square()).sum()
+
+    def _precision_of_outputs(self) -> Tensor:
+        """``(k,)``."""
+        return self.precision[self.kind]
 
     def _normal_equations(self, miss: Tensor, said1: Tensor) -> tuple[Tensor, Tensor]:
-        """J' J and J' r without J.
+        """J' P J and J' P r without J, for P the precision of each output.
 
         d output_k / d hidden_ji = V_kj s_j (1 - s_j) x_i: the outputs share all but the factor V_kj, so the products
         over the samples are needed once and not for every output.
         """
-        output = self.split(self.weights)[1]
+        output, precision = self.split(self.weights)[1], self._precision_of_outputs()[:, None]
         V, said = output[:, :-1], said1[:-1]
         slopes = ((said * (1.0 - said))[:, None] * self.x1).reshape(-1, self.x1.shape[1])  # (l (d + 1), N)
         each = V.repeat_interleave(self.inputs, dim=1)  # (k, l (d + 1))
         count, rest = len(slopes), output.numel()
         normal = torch.empty(count + rest, count + rest, dtype=slopes.dtype, device=slopes.device)
-        normal[:count, :count] = (slopes @ slopes.T) * (each.T @ each)
-        across = (slopes @ said1.T)[:, None] * each.T[:, :, None]
+        normal[:count, :count] = (slopes @ slopes.T) * (each.T @ (precision * each))
+        across = (slopes @ said1.T)[:, None] * (precision * each).T[:, :, None]
         normal[:count, count:] = across.reshape(count, rest)
         normal[count:, :count] = normal[:count, count:].T
-        normal[count:, count:] = torch.block_diag(*[said1 @ said1.T] * self.outputs)
+        squares, miss = said1 @ said1.T, precision * miss
+        normal[count:, count:] = torch.block_diag(*[each_output * squares for each_output in precision])
         return normal, torch.cat(
             [(slopes * (V.T @ miss).repeat_interleave(self.inputs, dim=0)).sum(1), (miss @ said1.T).ravel()]
         )
@@ -162,13 +171,19 @@ class _Fit:
         factor, info = torch.linalg.cholesky_ex(matrix)
         if int(info) != 0:
             return
-        variance = torch.diag(torch.cholesky_inverse(factor))
-        well_determined = 0.0
-        for group in range(3):  # the thresholds of the outputs are free
+        known = 1.0 - self.decay[self.group] * torch.diag(torch.cholesky_inverse(factor))  # 0 to 1: how well, by data
+        for group in (0, 1, *range(3, len(self.decay))):
             mine = self.group == group
-            known = float(mine.sum() - self.decay[group] * variance[mine].sum())
             square = float(self.weights[mine].square().sum())
-            self.decay[group] = min(max(known / max(square, 1e-12), LEAST_DECAY), MOST_DECAY)
-            well_determined += max(known, 0.0)
-        left = max(miss.numel() - well_determined - self.outputs, 1.0)
-        self.precision = left / max(float(miss.square().sum()), 1e-300)
+            self.decay[group] = min(max(float(known[mine].sum()) / max(square, 1e-12), LEAST_DECAY), MOST_DECAY)
+        of_neuron = self.split(known)[0].sum(1)
+        heard = self._precision_of_outputs()[:, None] * self.split(self.weights)[1][:, :-1].square()
+        for kind in range(len(self.precision)):
+            mine = self.kind == kind
+            # What is known of a neuron is known by those outputs that hear it.
+            share = heard[mine].sum(0) / heard.sum(0).clamp(min=1e-300)
+            well_determined = float(
+                known[self.group == 3 + kind].sum().clamp(min=0.0) + (share @ of_neuron).clamp(min=0.0)
+            )
+            left = max(miss[mine].numel() - well_determined - int(mine.sum()), 1.0)
+            self.precision[kind] = left / max(float(miss[mine].square().sum()), 1e-300)
