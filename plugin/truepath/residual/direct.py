@@ -15,8 +15,8 @@ from truepath.residual.options import Options
 
 VALIDATION_SHARE = 0.1
 LEAST_HALF_RANGE = 1e-9
-PAPER = Settings(individuals=100, smallest=5, largest=40, generations=300, stagnation=60)
-LONG = Limits(iterations=600, patience=120)
+PAPER = Settings(individuals=100, smallest=40, largest=60, generations=300, stagnation=60)
+LONG = Limits(iterations=500, patience=100)
 
 
 @dataclass(frozen=True, eq=False)
