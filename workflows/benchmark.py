@@ -10,7 +10,9 @@ five rounds every pose is held out once.
 Correction: a welding path of 10,000 waypoints corrected at once, against Drake's InverseKinematics for a
 sample of the same waypoints one by one, on a plant context with the same calibrated frames.
 
-Every process is held to one thread of linear algebra: on small matrices a second one only waits when the
+Evolution: a generation of 200 networks in one go, against one network at a time (``generation_benchmark.py``).
+
+Every process but that one is held to one thread of linear algebra: on small matrices a second one only waits when the
 machine is busy. A ratio is peer / truepath: above 1, truepath is better. What is absent, peer or data, is skipped
 and named. Accuracy counts as equal within half a micrometre: both fit 27 parameters, two of which this data hardly
 determines; a prior holds ours back, so the peer is a hair closer where it was fitted. A miss ends in exit code 1.
@@ -37,10 +39,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PEER_SCRIPT = ROOT / "workflows" / "peers" / "robotkinecal_solve.py"
 URDF = ROOT / "models" / "ur5" / "ur5.urdf"
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
-SPEEDUP_REQUIRED = 20.0
+SPEEDUP_REQUIRED, GENERATION_SPEEDUP = 20.0, 20.0
 TIE_MM = 0.0005  # a thirtieth of the tracker's own error
 FOLDS = 5
-IK_TOLERANCE_M, FLANGE_POINTS = 1e-6, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,11 +50,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeat", type=int, default=1, help="timed solves per process and round")
     parser.add_argument("--waypoints", type=int, default=10_000)
     parser.add_argument("--sample", type=int, default=100, help="waypoints that Drake solves")
+    parser.add_argument("--generations", type=int, default=30, help="of the evolution, timed")
     parser.add_argument("--peers", type=Path, default=ROOT / ".venv-peers", help="virtual environment of the peers")
     parser.add_argument("--json", action="store_true", help="print JSON for machines instead of a table")
     # For the processes that this script starts, as for the peer's script:
     parser.add_argument("--solve-ours", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--correct-ours", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--csv", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--train-rows", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
@@ -61,8 +62,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--rounds must be 1 to {FOLDS}, the other numbers at least 1")
     if options.solve_ours:
         print(json.dumps(solve_ours(options.csv, options.train_rows, options.repeat)))
-    elif options.correct_ours:
-        print(json.dumps(correct_ours(options.waypoints, options.sample, options.repeat)))
     else:
         report = compare(options)
         print(json.dumps(report, indent=1, allow_nan=False)) if options.json else print_table(report)
@@ -87,10 +86,14 @@ def compare(options: argparse.Namespace) -> dict[str, Any]:
         rows += _solve_rows(ours, peer)
         details["solve"] = {"truepath": ours, "robotkinecal": peer}
     _say("correction")
-    script = [sys.executable, str(Path(__file__).resolve()), "--correct-ours"]
-    script += ["--repeat", "3", "--waypoints", str(options.waypoints), "--sample", str(options.sample)]
+    script = [sys.executable, str(ROOT / "workflows" / "correction_benchmark.py")]
+    script += ["--waypoints", str(options.waypoints), "--sample", str(options.sample)]
     details["correction"] = _run(script)
     rows += _correction_rows(details["correction"])
+    _say("a generation of the evolution")
+    script = [sys.executable, str(ROOT / "workflows" / "generation_benchmark.py"), "--rounds", str(options.generations)]
+    details["generation"] = _run(script, all_cores=True)
+    rows += _generation_rows(details["generation"])
     machine = {"cpus": os.cpu_count(), "load_at_start": load}
     return {"schema": SCHEMA, "machine": machine, "rows": rows, "skipped": skipped, "details": details}
 
@@ -161,6 +164,16 @@ def _correction_rows(result: dict[str, Any]) -> list[dict]:
     ]
 
 
+def _generation_rows(result: dict[str, Any]) -> list[dict]:
+    what = f"a generation of {result['individuals']} networks, {result['largest']} neurons, {result['poses']} poses"
+    ours, required = 1e3 * result["batched_s"], f"ratio >= {GENERATION_SPEEDUP:g}"
+    met = result["torch_s"] / result["batched_s"] >= GENERATION_SPEEDUP
+    return [
+        _row(what, "ms", ours, "one at a time, torch", 1e3 * result["torch_s"], required=required, met=met),
+        _row(what, "ms", ours, "one at a time, numpy", 1e3 * result["numpy_s"]),
+    ]
+
+
 def solve_ours(csv: Path, train_rows: Path | None, repeat: int) -> dict[str, Any]:
     """What ``robotkinecal_solve.py`` prints, for truepath."""
     from truepath.calibrate import calibrate
@@ -191,77 +204,9 @@ def solve_ours(csv: Path, train_rows: Path | None, repeat: int) -> dict[str, Any
     return report
 
 
-def correct_ours(waypoints: int, sample: int, repeat: int) -> dict[str, Any]:
-    """A welding path corrected by truepath and, in part, by Drake's inverse kinematics."""
-    from truepath import lie, plants
-    from truepath.calibrate import calibrate
-    from truepath.correct import correct
-    from truepath.model import nominal_flange_poses
-    from truepath.programs.toolpath_csv import read_toolpath
-    from truepath.virtual.real_robot import RealRobot
-    from truepath.virtual.simulate import Campaign, free_poses, measure
-
-    robot, real = plants.load_robot("ur5_cell"), RealRobot("ur5_cell", seed=0)
-    model = calibrate(robot, measure(real, free_poses(real, 100, np.random.default_rng(0)), Campaign())).model
-    q_path = read_toolpath(plants.models_dir() / "ur5" / "weld_path.csv", robot.num_joints).q_rad
-    assert q_path is not None
-    along = np.linspace(0, len(q_path) - 1, waypoints)
-    q = np.stack([np.interp(along, np.arange(len(q_path)), column) for column in q_path.T], axis=1)
-    seconds, corrected = [], correct(model, q)  # the first one is the warm-up
-    for _ in range(repeat):
-        start = time.perf_counter()
-        corrected = correct(model, q)
-        seconds.append(time.perf_counter() - start)
-    goal = model.goal_flange_poses(nominal_flange_poses(robot, q))
-    picked = np.unique(np.linspace(0, waypoints - 1, sample).astype(int))
-    q_drake, ik_seconds, solved = _drake_ik(model, goal[picked], q[picked])
-
-    def largest_error_um(q_rad: np.ndarray) -> float:
-        return 1e6 * float(np.linalg.norm(lie.pose_error(goal[picked], model.flange_poses(q_rad))[:, 3:], axis=1).max())
-
-    return {
-        "waypoints": waypoints,
-        "per_waypoint_us": 1e6 * statistics.median(seconds) / waypoints,
-        "max_error_um": largest_error_um(corrected.q_rad[picked]),
-        "ik_waypoints": len(picked),
-        "ik_solved": solved,
-        "ik_per_waypoint_us": 1e6 * statistics.median(ik_seconds),
-        "ik_max_error_um": largest_error_um(q_drake),
-    }
-
-
-def _drake_ik(model: Any, X_BF: np.ndarray, q_start: np.ndarray) -> tuple[np.ndarray, list[float], int]:
-    """Joints, seconds per waypoint and number of successes of Drake's InverseKinematics from the programmed joints.
-
-    A pose is asked for as the places of three points of the flange: with an orientation constraint, SNOPT
-    stops at 1.4 mrad and takes longer.
-    """
-    from pydrake.multibody.inverse_kinematics import InverseKinematics
-    from pydrake.solvers import Solve
-    from truepath import plants
-    from truepath.export import set_calibrated_frames
-
-    plant = plants.load_plant("ur5_cell")
-    context = plant.CreateDefaultContext()
-    set_calibrated_frames(model, plant, context)
-    base, flange = plant.GetFrameByName("base_link"), plant.GetFrameByName("flange")
-    joints, seconds, solved = np.empty_like(q_start), [], 0
-    for k, (X, q) in enumerate(zip(X_BF, q_start, strict=True)):
-        start = time.perf_counter()
-        ik = InverseKinematics(plant, context)
-        for point in FLANGE_POINTS:
-            goal = X[:3, :3] @ point + X[:3, 3]
-            ik.AddPositionConstraint(flange, point, base, goal - IK_TOLERANCE_M, goal + IK_TOLERANCE_M)
-        ik.prog().SetInitialGuess(ik.q(), q)
-        result = Solve(ik.prog())
-        joints[k] = result.GetSolution(ik.q())
-        seconds.append(time.perf_counter() - start)
-        solved += int(result.is_success())
-    return joints, seconds, solved
-
-
-def _run(command: list[str]) -> dict[str, Any]:
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **ONE_THREAD}, timeout=600)
+def _run(command: list[str], *, all_cores: bool = False) -> dict[str, Any]:
+    env = {**os.environ} if all_cores else {**os.environ, **ONE_THREAD}
+    done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=600)
     try:
         return json.loads(done.stdout.strip().splitlines()[-1])
     except (ValueError, IndexError):
