@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from threading import Event
 
@@ -95,11 +95,16 @@ def learn_networks(
 
     workers = 1 if options.device != "cpu" else min(len(lessons), os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
+        futures = [pool.submit(one, lesson) for lesson in lessons]
         try:
-            return list(pool.map(one, lessons))
+            for future in as_completed(futures):  # so that a fault in any of them is known at once
+                future.result()
         except BaseException:  # Ctrl-C above all: the other networks shall not go on for long
             stop.set()
+            for future in futures:
+                future.cancel()
             raise
+    return [future.result() for future in futures]
 
 
 @dataclass(frozen=True, eq=False)

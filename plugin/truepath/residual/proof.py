@@ -14,7 +14,7 @@ from truepath.model import CalibratedModel
 from truepath.residual.learning import FEWEST_POSES, Progress, learn_for_each
 from truepath.residual.options import Options
 from truepath.residual.samples import Samples
-from truepath.splits import block_parts, random_parts
+from truepath.splits import LONG, block_parts, random_parts
 
 FitTo = Callable[[Array], CalibratedModel]
 
@@ -22,6 +22,7 @@ SIGNIFICANT = 0.01
 WORTH_MENTIONING_MM = 1e-4  # no tracker sees less; data without noise would prove any gain
 TOLERATED = 1.02  # times the orientation error without networks: less is chance, and nobody would notice
 FOLDS = 5
+ROWS_PER_GUARD = 30  # of all rows, one stays out on each side of a block for so many
 
 
 @dataclass(frozen=True)
@@ -78,14 +79,14 @@ def cross_validated(trial: KeptAway, fit: FitTo, options: Options, progress: Pro
     if visits.max(initial=-1) + 1 < FEWEST_POSES:
         return Proof(1.0, 0.0, 0.0)
     proofs = []
-    for title, folds in (
-        ("cross-validation of the network", random_parts(visits, FOLDS)),
-        ("cross-validation of the network in blocks", block_parts(len(seen), FOLDS)),
+    for title, folds, guard in (
+        ("cross-validation of the network", random_parts(visits, FOLDS), 0),
+        ("cross-validation of the network in blocks", block_parts(len(seen), FOLDS, LONG), len(seen) // ROWS_PER_GUARD),
     ):
         learnt_from, asked = [], []
         for number, fold in enumerate(folds):
             progress(f"{title}: fit {number + 1} of {FOLDS}")
-            rest = np.delete(seen, fold)
+            rest = np.delete(seen, _with_neighbours(fold, guard, len(seen)))
             samples = Samples.of(fit(rest), trial.measurements, trial.context)
             learnt_from.append(samples.subset(rest))
             asked.append(samples.subset(seen[fold]))
@@ -95,6 +96,12 @@ def cross_validated(trial: KeptAway, fit: FitTo, options: Options, progress: Pro
         with_it = Samples.joined(left, folds, visits)
         proofs.append(compare(without, with_it))
     return max(proofs, key=lambda proof: proof.p_value)
+
+
+def _with_neighbours(rows: Array, reach: int, count: int) -> Array:
+    """Rows and as many on both sides of each: what stands next to a block may have in common with it what it has."""
+    around = rows[:, None] + np.arange(-reach, reach + 1)
+    return np.unique(np.clip(around, 0, count - 1))
 
 
 def _by_visit(values: Array, visits: Array) -> Array:
