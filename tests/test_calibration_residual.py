@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from command import is_refused
 from pydantic import ValidationError
+from truepath import lie
 from truepath.calibrate import calibrate
 from truepath.calibration import Calibration, load_calibration
 from truepath.calibration_residual import NetworkPart, ResidualPart
@@ -220,3 +221,12 @@ def test_with_weights_larger_than_a_robot_a_program_is_refused_not_corrected(
     outcome = truepath("correct", program, "-c", written(large), "-o", tmp_path / "out.csv")
     assert outcome.code == 2, outcome.err
     assert not (tmp_path / "out.csv").exists()
+
+
+def test_after_another_probe_was_mounted_networks_turn_the_flange_as_before(fit, clean):
+    """They learnt what turned about the old probe; where the new one sits makes no difference to the flange."""
+    model = fit.model.with_residual(residual_over(clean.q_rad[:60], 6))
+    moved = replace(model, X_FE=model.X_FE @ lie.make_pose(translation=np.array([0.1, -0.1, 0.2])))
+    q = clean.q_rad[:20]
+    assert np.abs(model.residual.shift(q)[:, 3:]).max() > 1e-5
+    np.testing.assert_allclose(moved.flange_poses(q), model.flange_poses(q), rtol=0, atol=1e-12)

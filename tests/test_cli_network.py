@@ -158,6 +158,18 @@ def test_wrong_options_are_refused_and_what_is_there_stays(truepath, odd, tmp_pa
     assert [path.name for path in tmp_path.iterdir()] == ["c.json"]
 
 
+def test_a_seed_without_networks_is_refused(truepath, odd, tmp_path):
+    result = truepath("calibrate", odd, *PLAIN, "--seed", 5, "-o", tmp_path / "c.json")
+    assert result.code == 2
+    assert "--residual network" in result.err
+
+
+def test_a_place_that_is_not_there_is_refused_before_the_work(truepath, odd, tmp_path):
+    result = truepath("calibrate", odd, *NETWORK, "-o", tmp_path / "nowhere" / "c.json")
+    assert result.code == 2
+    assert "the output cannot be written" in result.err
+
+
 def test_a_negative_seed_is_refused(truepath, odd, tmp_path):
     assert truepath("calibrate", odd, *NETWORK, "--seed", -1, "-o", tmp_path / "c.json").code == 2
     assert list(tmp_path.iterdir()) == []

@@ -1,11 +1,10 @@
 """Parts of a data set that are left out in turn: every row once, visits of a pose together, neighbours in blocks."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from truepath.measurements import Measurements
-from truepath.splits import LONG, SHORT, block_parts, random_parts
+from truepath.splits import BLOCKS_PER_PART, block_parts, random_parts
 
 
 @given(visits=st.lists(st.integers(0, 8), min_size=9, max_size=60), count=st.integers(2, 6), seed=st.integers(0, 99))
@@ -35,21 +34,20 @@ def test_random_parts_are_spread_over_the_campaign():
         assert abs(part.mean() - 249.5) < 50
 
 
-@given(rows=st.integers(1, 500), count=st.integers(2, 6), blocks=st.sampled_from([SHORT, LONG]))
-def test_every_row_is_in_one_block(rows, count, blocks):
-    parts = block_parts(rows, count, blocks)
+@given(rows=st.integers(1, 500), count=st.integers(2, 6))
+def test_every_row_is_in_one_block(rows, count):
+    parts = block_parts(rows, count)
     assert len(parts) == count
     assert sorted(np.concatenate(parts).tolist()) == list(range(rows))
 
 
-@pytest.mark.parametrize("blocks", [SHORT, LONG])
-def test_blocks_hold_neighbours_in_time_and_each_part_has_some_all_over_the_campaign(blocks):
-    for part in block_parts(400, 5, blocks):
+def test_blocks_hold_neighbours_in_time_and_each_part_has_some_all_over_the_campaign():
+    for part in block_parts(400, 5):
         runs = np.split(part, np.flatnonzero(np.diff(part) > 1) + 1)
-        assert len(runs) == blocks
-        assert {len(run) for run in runs} == {400 // 5 // blocks}
-        assert part.min() < 400 // blocks
-        assert part.max() >= 400 - 400 // blocks
+        assert len(runs) == BLOCKS_PER_PART
+        assert {len(run) for run in runs} == {400 // 5 // BLOCKS_PER_PART}
+        assert part.min() < 400 // BLOCKS_PER_PART
+        assert part.max() >= 400 - 400 // BLOCKS_PER_PART
 
 
 def test_the_folds_of_measurements_keep_visits_together():

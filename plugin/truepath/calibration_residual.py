@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 LARGEST = 1e12  # no weight and no angle is beyond it; sums and products of larger numbers may be no numbers
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Rows = list[list[Number]]
+Angle = Annotated[float, Field(ge=-100.0, le=100.0)]  # rad: no arm turns so often
+Distance = Annotated[float, Field(ge=1e-6, le=100.0)]  # as ``Reach.of`` has it
 Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 KINDS = (3, 6)  # outputs: a position, or a position and a turn
 
@@ -58,11 +60,11 @@ class NetworkPart(Part):
 class ReachPart(Part):
     """Where the data was: see ``residual.reach.Reach``."""
 
-    lower_rad: list[Number]
-    upper_rad: list[Number]
-    poses_rad: Annotated[Rows, Field(min_length=1)]
-    median: Positive
-    spacing: Positive
+    lower_rad: list[Angle]
+    upper_rad: list[Angle]
+    poses_rad: Annotated[list[list[Angle]], Field(min_length=1)]
+    median: Distance
+    spacing: Distance
 
 
 class ProofPart(Part):
@@ -78,11 +80,15 @@ class ProofPart(Part):
 
 
 class ResidualPart(Part):
-    """Networks from joints, scaled to the reach of the data, to misses in units of ``scale`` (m; rad)."""
+    """Networks from joints, scaled to the reach of the data, to misses in units of ``scale`` (m; rad).
 
-    networks: Annotated[list[NetworkPart], Field(min_length=1)]
+    ``probe_m`` is where the probe sat on the flange when they learnt.
+    """
+
+    networks: Annotated[list[NetworkPart], Field(min_length=2)]
     scale: Annotated[list[Positive], Field(min_length=3, max_length=6)]
     reach: ReachPart
+    probe_m: Annotated[list[Number], Field(min_length=3, max_length=3)] | None
     proof: ProofPart
 
     @classmethod
@@ -98,6 +104,7 @@ class ResidualPart(Part):
                 median=reach.median,
                 spacing=reach.spacing,
             ),
+            probe_m=None if residual.p_FE is None else residual.p_FE.tolist(),
             proof=ProofPart.of(proof),
         )
 
@@ -123,4 +130,9 @@ class ResidualPart(Part):
         reach = self.reach
         lower, upper, poses = np.array(reach.lower_rad), np.array(reach.upper_rad), np.array(reach.poses_rad)
         networks = tuple(part.network() for part in self.networks)
-        return NetworkResidual(networks, np.array(self.scale), Reach(lower, upper, poses, reach.median, reach.spacing))
+        return NetworkResidual(
+            networks,
+            np.array(self.scale),
+            Reach(lower, upper, poses, reach.median, reach.spacing),
+            None if self.probe_m is None else np.array(self.probe_m),
+        )

@@ -45,16 +45,17 @@ def calibrate(
     residual: Residual = "none",
     parameters: Annotated[bool, typer.Option("--parameters", help="also list every parameter")] = False,
     device: Device = "cpu",
-    seed: Seed = 0,
+    seed: Seed = None,
     checkpoint: Resume = None,
     json: Json = False,
 ) -> None:
     """Learn the real robot from measured poses and write a calibration file."""
     from truepath import console
     from truepath.learn import learn
-    from truepath.pipeline import keep, named_effects, naming, networks
+    from truepath.pipeline import keep, named_effects, naming, networks, require_place
 
     keep(output, data)
+    require_place(output)
     with networks(residual, device, seed, checkpoint, data, output) as options, console.progress("calibrating") as say:
         say("reading the robot")
         nominal = robot_named(robot)
@@ -87,7 +88,7 @@ def diagnose(
     probe: Probe = "unknown",
     residual: Residual = "none",
     device: Device = "cpu",
-    seed: Seed = 0,
+    seed: Seed = None,
     checkpoint: Resume = None,
     json: Json = False,
 ) -> None:

@@ -32,7 +32,9 @@ Residual = Annotated[
     str, typer.Option(help="network: learn what no cause explains by neural networks, if that is proved to help; none")
 ]
 Device = Annotated[str, typer.Option(help="where networks learn: cpu or cuda", rich_help_panel="Networks")]
-Seed = Annotated[int, typer.Option(min=0, help="of the networks' chance", rich_help_panel="Networks")]
+Seed = Annotated[
+    int | None, typer.Option(min=0, help="of the networks' chance [default: 0]", rich_help_panel="Networks")
+]
 Resume = Annotated[
     Path | None,
     typer.Option(

@@ -20,7 +20,7 @@ from truepath.effect_fit import EffectFit, fit_effects
 from truepath.effects import EFFECTS
 from truepath.errors import CalibrationError
 from truepath.findings import Evidence, gather
-from truepath.learn import cross_validate, on_kept_away, with_network
+from truepath.learn import DRIFT, cross_validate, on_kept_away, with_network
 from truepath.lie import Array
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel
@@ -164,12 +164,14 @@ def _findings(trial: UnseenPoses, evidence: Evidence) -> tuple[Finding, ...]:
 def _decide(trial: UnseenPoses, looked_at: Array, options: Options, progress: Progress) -> Decision:
     from truepath.residual.decision import decide  # torch takes a second to import
 
-    def fit_to(rows: Array) -> CalibratedModel:
-        rows = np.intersect1d(rows, looked_at)
-        if len(rows) == np.count_nonzero(trial.seen[looked_at]):
+    def fit_to(rows: Array, drifting: bool) -> CalibratedModel:
+        rows, terms = np.intersect1d(rows, looked_at), trial.evidence.named
+        if len(rows) == np.count_nonzero(trial.seen[looked_at]) and not drifting:
             return trial.final
         part = fit_kinematics(trial.final.robot, trial.measurements.subset(rows), trial.context.subset(rows))
-        return finish(part, fit_effects(part.fit, part.context, trial.evidence.named, prune=False)).model
+        if drifting and not any(term.effect == DRIFT for term in terms):
+            terms += tuple(EFFECTS[DRIFT].terms(trial.final.robot, part.context))
+        return finish(part, fit_effects(part.fit, part.context, terms, prune=drifting)).model
 
     return decide(trial, fit_to, options, progress)
 

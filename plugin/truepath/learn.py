@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from truepath.residual.decision import Decision
     from truepath.residual.options import Options
 
-FOLDS = 5
+FOLDS, DRIFT = 5, "frame_drift"
 
 Progress = Callable[[str], None]
 
@@ -163,7 +163,7 @@ def with_network(
     left = samples.less(residual.shift(samples.q_rad)).miss
     return replace(
         fit,
-        model=replace(fit.model, residual=residual),
+        model=fit.model.with_residual(residual),
         sigma_position_m=float(np.sqrt(np.mean(left[:, :3] ** 2))),
         sigma_orientation_rad=float(np.sqrt(np.mean(left[:, 3:] ** 2))) if left.shape[1] > 3 else None,
     )
@@ -184,8 +184,9 @@ def _decide(
     unseen = np.isin(np.arange(len(measurements)), measurements.folds(FOLDS)[0])
     trial = KeptAway(measurements, context, unseen & ~fit.outlier, ~unseen & ~fit.outlier)
 
-    def fit_to(rows: Array) -> CalibratedModel:
-        return calibrate(robot, measurements.subset(rows), effects).model
+    def fit_to(rows: Array, drifting: bool) -> CalibratedModel:
+        names = (*effects, DRIFT) if drifting and DRIFT not in effects else effects
+        return calibrate(robot, measurements.subset(rows), names).model
 
     decision = decide(trial, fit_to, network, progress)
     if decision.model is None:

@@ -69,10 +69,16 @@ class CalibratedModel:
 
     def _with_residual(self, X_BF: Array, shift: Array) -> Array:
         """The flange such that the probe on it is shifted and turned by ``(N, 6)``, m and rad, in B."""
-        X_BE = X_BF @ self.X_FE
+        assert self.residual is not None
+        X_FE = self.X_FE if self.residual.p_FE is None else lie.make_pose(translation=self.residual.p_FE)
+        X_BE = X_BF @ X_FE
         X_BE[:, :3, 3] += shift[:, :3]
         X_BE[:, :3, :3] = lie.from_rotation_vector(shift[:, 3:]) @ X_BE[:, :3, :3]
-        return X_BE @ lie.invert(self.X_FE)
+        return X_BE @ lie.invert(X_FE)
+
+    def with_residual(self, residual: NetworkResidual) -> CalibratedModel:
+        """The same with networks that have learnt what it leaves, for the probe that it has now."""
+        return replace(self, residual=replace(residual, p_FE=self.X_FE[:3, 3]))
 
     def flange_poses_and_jacobian(self, q_rad: Array) -> tuple[Array, Array]:
         """The same and its Jacobian ``(N, 6, n)`` (angular, linear velocity of the flange origin, in B).

@@ -50,7 +50,9 @@ def naming(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def networks(residual: str, device: str, seed: int, checkpoint: Path | None, *others: Path) -> Iterator[Options | None]:
+def networks(
+    residual: str, device: str, seed: int | None, checkpoint: Path | None, *others: Path
+) -> Iterator[Options | None]:
     """How to learn networks as stated on the command line, or None; keeps the checkpoint until all is done.
 
     Args:
@@ -65,7 +67,7 @@ def networks(residual: str, device: str, seed: int, checkpoint: Path | None, *ot
     if residual not in RESIDUALS:
         raise InputError(f"unknown residual {residual!r}", expected=" or ".join(RESIDUALS))
     if residual == "none":
-        if checkpoint is not None or device != "cpu":
+        if checkpoint is not None or seed is not None or device != "cpu":
             raise InputError("there are no networks to learn", expected="--residual network with these options")
         yield None
         return
@@ -73,7 +75,7 @@ def networks(residual: str, device: str, seed: int, checkpoint: Path | None, *ot
 
     require_device(Options(device=device).device)
     if checkpoint is None:
-        yield Options(seed=seed, device=device)
+        yield Options(seed=seed or 0, device=device)
         return
     from truepath.residual.checkpoint import Checkpoint
 
@@ -83,7 +85,7 @@ def networks(residual: str, device: str, seed: int, checkpoint: Path | None, *ot
     keep(checkpoint, *others)
     desk = Checkpoint(checkpoint)
     try:
-        yield Options(seed=seed, device=device, checkpoint=desk)
+        yield Options(seed=seed or 0, device=device, checkpoint=desk)
     except KeyboardInterrupt:
         from truepath.console import complain
 
@@ -159,6 +161,12 @@ def keep(output: Path, *inputs: Path) -> None:
     for path in inputs:
         if output.exists() and path.exists() and output.samefile(path):
             raise InputError("the output is the input", file=output, expected="another file: the original is kept")
+
+
+def require_place(output: Path) -> None:
+    """Refuses, before the work is done, where its result could not be written."""
+    if output.is_dir() or not output.absolute().parent.is_dir():
+        raise InputError("the output cannot be written", file=output, expected="a file in a folder that is there")
 
 
 def named_effects(text: str) -> tuple[str, ...] | Literal["auto"]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from truepath.lie import Array
 
-SHORT, LONG = 8, 2  # blocks per part
+BLOCKS_PER_PART = 8
 
 
 def random_parts(visits: Array, count: int, seed: int = 0) -> list[Array]:
@@ -17,11 +17,7 @@ def random_parts(visits: Array, count: int, seed: int = 0) -> list[Array]:
     return [np.flatnonzero(part[visits] == number) for number in range(count)]
 
 
-def block_parts(rows: int, count: int, blocks: int = SHORT) -> list[Array]:
-    """Row numbers of ``count`` parts of some blocks of neighbours each.
-
-    Many short blocks let a slow drift be seen on both sides of each; few long ones keep away whatever neighbours have
-    in common.
-    """
-    block = np.arange(rows) * count * blocks // rows
+def block_parts(rows: int, count: int) -> list[Array]:
+    """Row numbers of ``count`` parts of some short blocks each, so that a slow drift is seen on both sides of each."""
+    block = np.arange(rows) * count * BLOCKS_PER_PART // rows
     return [np.flatnonzero(block % count == number) for number in range(count)]

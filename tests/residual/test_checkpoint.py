@@ -142,8 +142,10 @@ def test_the_file_says_what_it_is(stopped):
     assert [state["generation"] for state in content["under_way"].values()] == [5]
 
 
-def test_when_all_is_done_nothing_is_left(stopped):
+def test_when_all_is_done_nothing_is_left(stopped, lesson):
     desk = Checkpoint(stopped)
+    learn_network(lesson, replace(OPTIONS, checkpoint=desk))
+    assert stopped.exists()
     desk.remove()
     assert not stopped.exists()
     desk.remove()
@@ -269,3 +271,13 @@ def test_however_a_file_is_spoilt_it_is_refused_or_it_is_still_a_checkpoint(good
     except InputError as error:
         refused = str(error)
     assert "spoilt.json" in refused if refused else np.isfinite(numbers(network)).all()
+
+
+def test_a_run_that_is_done_takes_only_its_own_entries_away(tmp_path, lesson):
+    path, other = tmp_path / "both.json", replace(lesson, seed=8)
+    for one in (other, lesson):
+        desk = Checkpoint(path)
+        learn_network(one, replace(OPTIONS, checkpoint=desk))
+    desk.remove()
+    assert Checkpoint(path).finished(Checkpoint.key(other, OPTIONS), other) is not None
+    assert Checkpoint(path).finished(Checkpoint.key(lesson, OPTIONS), lesson) is None

@@ -6,7 +6,7 @@ import torch
 from by_loop import output_by_loop, random_network
 from hypothesis import given
 from hypothesis import strategies as st
-from truepath.residual.network import Network, one_thread, outputs, vector_length
+from truepath.residual.network import Network, one_thread, outputs
 
 
 @pytest.fixture
@@ -38,15 +38,11 @@ def test_huge_inputs_saturate_a_neuron_and_are_no_trouble():
 
 
 @given(inputs=st.integers(1, 7), neurons=st.integers(1, 40), outputs=st.integers(1, 6))
-def test_the_length_is_the_number_of_weights_and_thresholds(inputs, neurons, outputs):
+def test_it_has_as_many_weights_and_thresholds_as_equation_18_says(inputs, neurons, outputs):
     network = random_network(np.random.default_rng(1), inputs, neurons, outputs)
     by_counting = network.hidden.size + network.output.size + network.bias.size
-    assert network.length == vector_length(inputs, neurons, outputs) == by_counting
+    assert by_counting == inputs * neurons + neurons + neurons * outputs + outputs
     assert network.neurons == neurons
-
-
-def test_the_length_of_the_paper_s_network_with_ten_neurons_is_103():
-    assert vector_length(6, 10, 3) == 6 * 10 + 10 + 10 * 3 + 3 == 103
 
 
 @given(sizes=st.lists(st.integers(1, 20), min_size=1, max_size=6), seed=st.integers(0, 1000))

@@ -111,16 +111,16 @@ def odd():
 @pytest.fixture(scope="module")
 def fit(ur5, odd):
     """Function: the kinematics fitted to some rows of it."""
-    return lambda rows: calibrate(ur5, odd.measurements.subset(rows)).model
+    return lambda rows, drifting: calibrate(ur5, odd.measurements.subset(rows)).model
 
 
 def test_every_fit_and_every_network_is_asked_about_poses_that_it_has_not_seen(odd, fit, monkeypatch):
     fitted_to, learnt_from, asked = [], [], []
     learn, poses = module.learn_for_each, [row.tobytes() for row in odd.measurements.q_rad]
 
-    def fit_and_remember(rows):
+    def fit_and_remember(rows, drifting):
         fitted_to.append({poses[row] for row in rows})
-        return fit(rows)
+        return fit(rows, drifting)
 
     def learn_and_remember(parts, *rest):
         learnt_from.extend({row.tobytes() for row in part.q_rad} for part in parts)

@@ -48,7 +48,7 @@ class StatePart(Part):
 
 
 class Content(Part):
-    schema_: Literal["truepath.evolution/1"] = Field(alias="schema", default=SCHEMA)
+    schema_: Literal["truepath.evolution/1"] = Field(alias="schema")
     finished: dict[str, NetworkPart]
     under_way: dict[str, StatePart]
 
@@ -69,6 +69,7 @@ class Checkpoint:
         self._finished: dict[str, NetworkPart] = {}
         self._read: dict[str, StatePart] = {}
         self._states: dict[str, State] = {}
+        self._asked: set[str] = set()
         if self.path.exists():
             content = _load(self.path)
             self._finished, self._read = dict(content.finished), dict(content.under_way)
@@ -79,12 +80,18 @@ class Checkpoint:
         digest = hashlib.sha256()
         for values in (lesson.x, lesson.target, lesson.validation):
             digest.update(np.ascontiguousarray(values).tobytes())
-        how = {"seed": lesson.seed, "evolution": asdict(options.evolution), "limits": asdict(options.limits)}
+        how = {
+            "seed": lesson.seed,
+            "device": options.device,
+            "evolution": asdict(options.evolution),
+            "limits": asdict(options.limits),
+        }
         digest.update(json.dumps(how, sort_keys=True).encode())
         return digest.hexdigest()
 
     def finished(self, key: str, lesson: Lesson) -> Network | None:
         """The network, if it was finished."""
+        self._asked.add(key)
         part = self._finished.get(key)
         return None if part is None else self._fitting([part], lesson)[0]
 
@@ -136,13 +143,20 @@ class Checkpoint:
             self._write()
 
     def remove(self) -> None:
-        """When everything is done, nothing is left of it."""
+        """When everything is done, nothing is left of it; what belongs to another run stays."""
+        with self._lock:
+            for key in self._asked:
+                for entries in (self._finished, self._read, self._states):
+                    entries.pop(key, None)
+            if self._finished or self._read or self._states:
+                self._write()
+                return
         with suppress(FileNotFoundError):
             self.path.unlink()
 
     def _write(self) -> None:
         under_way = self._read | {key: _part(state) for key, state in self._states.items()}
-        content = Content(finished=self._finished, under_way=under_way)
+        content = Content(schema=SCHEMA, finished=self._finished, under_way=under_way)
         write_atomically(self.path, content.model_dump_json(by_alias=True))
         self._written = time.monotonic()
 

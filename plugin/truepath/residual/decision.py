@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +48,7 @@ def decide(trial: KeptAway, fit: FitTo, options: Options, progress: Progress = l
 
     Args:
         trial: the poses.
-        fit: fits the model, all but the networks, to some rows.
+        fit: fits the model, all but the networks, to some rows; with a slow drift of the frame besides, if told so.
         options: how to learn.
         progress: told what is being done.
 
@@ -62,9 +62,9 @@ def decide(trial: KeptAway, fit: FitTo, options: Options, progress: Progress = l
         return impossible()
     if not proof.holds:
         return Decision(proof, None, None, left_out(proof))
-    named = fit(np.flatnonzero(trial.seen))
+    named = fit(np.flatnonzero(trial.seen), False)
     samples = Samples.of(named, trial.measurements, trial.context).subset(trial.seen)
-    model = replace(named, residual=learn_ensemble(samples, options, "learning the network", progress))
+    model = named.with_residual(learn_ensemble(samples, options, "learning the network", progress))
     gain = trial.gain(named, model)
     if not gain.after_mm < gain.before_mm:  # in this way round for what is no number
         why = (

@@ -19,11 +19,14 @@ class NetworkResidual:
         networks: from joints, scaled by ``reach``, to misses in units of ``scale``.
         scale: ``(3,)`` m, or with orientations ``(6,)`` m and rad.
         reach: where the data was.
+        p_FE: ``(3,)`` where the probe sat on the flange when they learnt, m: what they turn, they turn about it, also
+            when another probe is there. None: where the model of which they are a part has it.
     """
 
     networks: tuple[Network, ...]
     scale: Array
     reach: Reach
+    p_FE: Array | None = None
 
     def shift(self, q_rad: Array) -> Array:
         """``(N, 6)`` shift and turn of the probe by which the robot differs from the rest of the model.

@@ -34,19 +34,9 @@ class Network:
     def neurons(self) -> int:
         return len(self.hidden)
 
-    @property
-    def length(self) -> int:
-        """How many numbers it takes to describe it (eq. 18)."""
-        return vector_length(self.hidden.shape[1] - 1, self.neurons, len(self.bias))
-
     def __call__(self, x: Array) -> Array:
         """``(N, k)`` outputs for scaled inputs ``(N, d)``."""
         return outputs([self], x)[0]
-
-
-def vector_length(inputs: int, hidden: int, outputs: int) -> int:
-    """Number of weights and thresholds of a network (eq. 18)."""
-    return inputs * hidden + hidden + hidden * outputs + outputs
 
 
 def with_ones(x: Tensor) -> Tensor:

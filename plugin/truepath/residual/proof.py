@@ -14,15 +14,14 @@ from truepath.model import CalibratedModel
 from truepath.residual.learning import FEWEST_POSES, Progress, learn_for_each
 from truepath.residual.options import Options
 from truepath.residual.samples import Samples
-from truepath.splits import LONG, block_parts, random_parts
+from truepath.splits import block_parts, random_parts
 
-FitTo = Callable[[Array], CalibratedModel]
+FitTo = Callable[[Array, bool], CalibratedModel]  # to some rows; whether the frame may drift
 
 SIGNIFICANT = 0.01
 WORTH_MENTIONING_MM = 1e-4  # no tracker sees less; data without noise would prove any gain
 TOLERATED = 1.02  # times the orientation error without networks: less is chance, and nobody would notice
 FOLDS = 5
-ROWS_PER_GUARD = 30  # of all rows, one stays out on each side of a block for so many
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,13 @@ def compare(without: Samples, with_it: Samples) -> Proof:
 
 
 def cross_validated(trial: KeptAway, fit: FitTo, options: Options, progress: Progress = lambda _: None) -> Proof:
-    """The worse of two cross-validations over the poses that were seen: at random, and in blocks of neighbours in time.
+    """The worse of two cross-validations over the poses that were seen: at random, and in short blocks of neighbours.
 
     Whatever comes before the network is fitted anew each time, without the poses that are left out: what a fit leaves
     of its own poses is less than it leaves of others, and different.
 
-    Neighbours in time are often neighbours in joint space. A drift would then look like something that goes with the
-    pose; left out in blocks it does not.
+    Where poses were measured in some order of the joints, a drift looks like something that goes with the pose. At
+    random, the frame may therefore drift slowly in the model before the network: what that explains is not its gain.
 
     Args:
         trial: the poses.
@@ -79,29 +78,22 @@ def cross_validated(trial: KeptAway, fit: FitTo, options: Options, progress: Pro
     if visits.max(initial=-1) + 1 < FEWEST_POSES:
         return Proof(1.0, 0.0, 0.0)
     proofs = []
-    for title, folds, guard in (
-        ("cross-validation of the network", random_parts(visits, FOLDS), 0),
-        ("cross-validation of the network in blocks", block_parts(len(seen), FOLDS, LONG), len(seen) // ROWS_PER_GUARD),
+    for title, folds, drifting in (
+        ("cross-validation of the network", random_parts(visits, FOLDS), True),
+        ("cross-validation of the network in blocks", block_parts(len(seen), FOLDS), False),
     ):
         learnt_from, asked = [], []
         for number, fold in enumerate(folds):
             progress(f"{title}: fit {number + 1} of {FOLDS}")
-            rest = np.delete(seen, _with_neighbours(fold, guard, len(seen)))
-            samples = Samples.of(fit(rest), trial.measurements, trial.context)
+            rest = np.delete(seen, fold)
+            samples = Samples.of(fit(rest, drifting), trial.measurements, trial.context)
             learnt_from.append(samples.subset(rest))
             asked.append(samples.subset(seen[fold]))
         networks = learn_for_each(learnt_from, options, title, progress)
         without = Samples.joined(asked, folds, visits)
         left = [part.less(network.shift(part.q_rad)) for part, network in zip(asked, networks, strict=True)]
-        with_it = Samples.joined(left, folds, visits)
-        proofs.append(compare(without, with_it))
+        proofs.append(compare(without, Samples.joined(left, folds, visits)))
     return max(proofs, key=lambda proof: proof.p_value)
-
-
-def _with_neighbours(rows: Array, reach: int, count: int) -> Array:
-    """Rows and as many on both sides of each: what stands next to a block may have in common with it what it has."""
-    around = rows[:, None] + np.arange(-reach, reach + 1)
-    return np.unique(np.clip(around, 0, count - 1))
 
 
 def _by_visit(values: Array, visits: Array) -> Array:
