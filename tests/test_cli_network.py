@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -235,7 +236,9 @@ def test_ctrl_c_leaves_a_checkpoint_and_no_calibration_and_the_same_command_then
     program = QUICK.format(generations=MANY_GENERATIONS) + MAIN
     command = [sys.executable, "-c", program, "calibrate", odd, *NETWORK]
     quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": {**os.environ, "OMP_NUM_THREADS": "1"}}
-    process = subprocess.Popen([*command, "--checkpoint", kept, "-o", target], **quiet)
+    # Where the tests run in the background of a shell, it has told them to ignore Ctrl-C, and they would pass that on.
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    process = subprocess.Popen([*command, "--checkpoint", kept, "-o", target], **quiet, preexec_fn=heard)
     try:
         deadline = time.monotonic() + 60
         while not kept.exists() and process.poll() is None and time.monotonic() < deadline:

@@ -18,7 +18,7 @@ COMPLIANCE, PAYLOAD_KG = 3e-5, 5.0
 @pytest.fixture(scope="module")
 def file(real_ur5, clean, clean_kinematic, tmp_path_factory):
     """A calibration of a robot whose joint 2 is soft."""
-    plain, _ = learn(real_ur5.robot, clean, source="ur5_cell")
+    plain, *_ = learn(real_ur5.robot, clean, source="ur5_cell")
     terms = EFFECTS["joint_compliance"].terms(real_ur5.robot, clean_kinematic.context)
     (term,) = (term for term in terms if term.joint == 2)
     soft = EffectPart.of(FittedTerm(term, np.array([COMPLIANCE]), np.array([1e-7])))
