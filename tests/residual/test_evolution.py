@@ -8,21 +8,12 @@ import torch
 from by_loop import error_by_loop, genes, output_by_loop, random_network
 from hypothesis import given
 from hypothesis import strategies as st
+from small_evolution import SMALL
 from truepath.residual.evolution import evolve, first_generation, next_generation, stepped, trials
-from truepath.residual.limits import Settings
 from truepath.residual.network import with_ones
 from truepath.residual.population import Population, generator_for
 
 CPU = torch.device("cpu")
-SMALL = Settings(individuals=12, smallest=2, largest=9, generations=25, sizes_every=5)
-
-
-@pytest.fixture(scope="module")
-def task():
-    """Inputs ``(N, 3)``, targets ``(N, 2)``."""
-    rng = np.random.default_rng(0)
-    x = rng.uniform(-1, 1, (40, 3))
-    return x, np.stack([np.sin(2 * x[:, 0] + x[:, 1]), x[:, 2] ** 2], axis=1)
 
 
 @pytest.fixture(scope="module")

@@ -9,19 +9,10 @@ from by_loop import genes
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from small_evolution import SMALL
 from truepath.errors import InputError
 from truepath.residual.evolution import State, evolve, has_ended
 from truepath.residual.limits import Settings
-
-SMALL = Settings(individuals=12, smallest=2, largest=9, generations=25, sizes_every=5)
-
-
-@pytest.fixture(scope="module")
-def task():
-    """Inputs ``(N, 3)``, targets ``(N, 2)``."""
-    rng = np.random.default_rng(0)
-    x = rng.uniform(-1, 1, (40, 3))
-    return x, np.stack([np.sin(2 * x[:, 0] + x[:, 1]), x[:, 2] ** 2], axis=1)
 
 
 def same(a, b):
