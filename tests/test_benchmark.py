@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -47,7 +48,8 @@ def rows_by_name(report: dict) -> dict:
 def test_without_peer_and_data_it_says_so_and_still_compares_the_correction(tmp_path, no_peers, monkeypatch):
     monkeypatch.setenv("TRUEPATH_DATA", str(tmp_path))
     done = subprocess.run([sys.executable, SCRIPT, *QUICK, *no_peers], capture_output=True, text=True, check=False)
-    assert done.returncode in (0, 1), done.stderr  # 1: on a busy machine no ratio can be relied upon
+    missed = len(re.findall(r"no +│\n", done.stdout))  # the last column
+    assert done.returncode == int(missed > 0), done.stdout + done.stderr
     assert "skipped: kinematic solve: no " in done.stdout
     assert "TRUEPATH_DATA" in done.stdout
     assert "Drake IK" in done.stdout
@@ -56,9 +58,11 @@ def test_without_peer_and_data_it_says_so_and_still_compares_the_correction(tmp_
 
 def test_without_peer_the_own_numbers_are_given(benchmark, data_dir, no_peers, monkeypatch, capsys):
     monkeypatch.setenv("TRUEPATH_DATA", str(data_dir))
-    monkeypatch.setattr(benchmark, "GENERATION_SPEEDUP", 0.0)  # on a busy machine no ratio can be relied upon
-    assert benchmark.main([*QUICK, *no_peers, "--json"]) == 0
+    code = benchmark.main([*QUICK, *no_peers, "--json"])
     report = json.loads(capsys.readouterr().out)
+    missed = [row["peer_name"] for row in report["rows"] if row["met"] is False]
+    assert missed in ([], ["one at a time, torch"])  # that one depends on the machine
+    assert code == int(bool(missed))
     assert report["schema"] == "truepath.benchmark/1"
     assert "make bench" in report["skipped"][0]
     solve = rows_by_name(report)["kinematic solve"]

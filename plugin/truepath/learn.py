@@ -139,7 +139,7 @@ def on_kept_away(
     how = "a fifth of the poses, drawn at random, kept away from fit and choice of effects"
     without_networks = None
     if final is not None:
-        how += " and networks"
+        how += " and networks, outliers left out"
         without_networks = trial.accuracy(named) if named.effects else None
     return held_out(
         how,
@@ -182,7 +182,7 @@ def _decide(
 
     context = Context.of(measurements)
     unseen = np.isin(np.arange(len(measurements)), measurements.folds(FOLDS)[0])
-    trial = KeptAway(measurements, context, unseen & ~fit.outlier, ~unseen & ~fit.outlier)
+    trial = KeptAway(measurements, context, unseen & ~fit.outlier, ~unseen & ~fit.outlier)  # as in cross_validate
 
     def fit_to(rows: Array, drifting: bool) -> CalibratedModel:
         names = (*effects, DRIFT) if drifting and DRIFT not in effects else effects
