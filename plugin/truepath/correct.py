@@ -231,9 +231,7 @@ def _where_faded(networks: NetworksAlong, line: Array) -> str:
     count, out = int(networks.faded.sum()), int(networks.silent.sum())
     where = f"at {count} of {len(line)} waypoints (first in line {int(line[np.argmax(networks.faded)])})"
     fact = f"the networks are faded {where}" + (f", at {out} of them to nothing" if out else "")
-    corrected = "corrected in part only"
     if out == count:
-        fact, corrected = f"the networks are faded out {where}", "not corrected"
-    elif out:
-        corrected = "corrected in part or not at all"
-    return f"{fact}: too few poses were measured near these, and what only the networks know is {corrected} there"
+        fact = f"the networks are faded out {where}"
+    told = f"what only the networks know is {networks.corrected} there"
+    return f"{fact}: too few poses were measured near these, and {told}"

@@ -49,3 +49,10 @@ class NetworksAlong:
     def silent(self) -> Array:
         """``(N,)`` True where they say nothing at all."""
         return self.weight < ROUNDING
+
+    @property
+    def corrected(self) -> str:
+        """How far that which only they know is corrected where they are faded, in words."""
+        if np.array_equal(self.silent, self.faded):
+            return "not corrected"
+        return "corrected in part or not at all" if self.silent.any() else "corrected in part only"

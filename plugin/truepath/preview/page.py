@@ -169,8 +169,7 @@ def _network_notes(networks: NetworksAlong) -> list[tuple[str, str]]:
         notes = [("", f"{where}: none of {total}.")]
     else:
         how = f"{where}: {faded} of {total}" + (f", to nothing at {silent}" if silent else "")
-        corrected = "not corrected" if silent == faded else "corrected in part" + (" or not at all" if silent else "")
-        notes = [(" warning", f"{how}. There what only they know is {corrected}.")]
+        notes = [(" warning", f"{how}. There what only they know is {networks.corrected}.")]
     if silent < total:
         spread = networks.spoken_mm
         notes.append(("", f"Spread of the networks: {spread.mean():.3f} mm (mean), {spread.max():.3f} mm (max)."))
