@@ -1,0 +1,1 @@
+"""URScript: parse, resolve, rewrite; every byte that is no target stays."""

@@ -1,0 +1,203 @@
+"""The value of an expression, as far as it is known before the program runs."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from truepath.programs.urscript.source import Line
+from truepath.programs.urscript.syntax import Node
+from truepath.programs.urscript.values import PURE, JointsOf, Pose, Unknown, Value, all_finite, call_pure, is_number
+
+COMPARE: dict[str, Callable[[Any, Any], bool]] = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+ARITHMETIC: dict[str, Callable[[Any, Any], float]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "modulo": math.fmod,
+}
+CONSTANTS: dict[str, Value] = {"pi": math.pi}
+MOST_ELEMENTS = 100_000
+
+
+class Scene(Protocol):
+    """What an expression may ask of the program around it."""
+
+    def variable(self, name: str) -> Value: ...
+
+    def call(self, node: Node, arguments: list[Value], keywords: dict[str, Value], line: Line) -> Value: ...
+
+    def start_thread(self, name: str) -> None: ...
+
+
+def word(node: Node | str, line: Line) -> str:
+    """A name as it stands in its line."""
+    if isinstance(node, str):
+        return node
+    return line.slots[node.slot] if node.slot >= 0 else str(node.args[0])
+
+
+def evaluate(node: Node, line: Line, scene: Scene) -> Value:
+    """A value, or Unknown with the reason."""
+    op, args = node.op, node.args
+    if op == "number":
+        return _number(line.slots[node.slot])
+    if op == "name":
+        name = word(node, line)
+        value = scene.variable(name)
+        return CONSTANTS.get(name, Unknown(f"{name} is not set")) if value is None else value
+    if op == "pose":
+        return _pose(args[1] or (), line, scene)
+    if op == "list_":
+        values = tuple(evaluate(each, line, scene) for each in args[0] or ())
+        return next((value for value in values if isinstance(value, Unknown)), values)
+    if op == "call":
+        return _call(node, line, scene)
+    if op == "negative":
+        value = evaluate(args[0], line, scene)
+        return -value if is_number(value) else _cannot("-", value)
+    if op in ARITHMETIC:
+        return _arithmetic(op, evaluate(args[0], line, scene), evaluate(args[1], line, scene))
+    if op == "string":
+        return line.slots[node.slot][1:-1]
+    if op in ("true", "false"):
+        return op == "true"
+    if op == "index":
+        return _index(evaluate(args[0], line, scene), [evaluate(each, line, scene) for each in args[1:]])
+    return _rare(op, args, line, scene)
+
+
+def _rare(op: str, args: tuple[Any, ...], line: Line, scene: Scene) -> Value:
+    if op == "compare":
+        one, other = evaluate(args[0], line, scene), evaluate(args[2], line, scene)
+        return _compare(str(args[1]), one, other)
+    if op == "not_":
+        value = evaluate(args[0], line, scene)
+        return not value if isinstance(value, bool) else _cannot("not", value)
+    if op in ("and_", "or_", "xor_"):
+        return _logic(op, evaluate(args[0], line, scene), evaluate(args[1], line, scene))
+    if op == "method":
+        for each in args[2] or ():
+            evaluate(each.args[1] if each.op == "keyword" else each, line, scene)
+        return Unknown(f"{word(args[1], line)}() is known to the controller only")
+    if op == "of_threads":
+        if args[0] == "run" and args[1].op == "call":
+            scene.start_thread(word(args[1].args[0], line))
+        return Unknown("threads are known when they run")
+    return Unknown("members of a struct are not followed" if op == "member" else "this is not followed")
+
+
+def _number(text: str) -> float:
+    if text[:2] in ("0x", "0X"):
+        return int(text, 16)
+    return int(text) if text.isdigit() and len(text) < 16 else float(text)
+
+
+def _pose(nodes: tuple[Node, ...], line: Line, scene: Scene) -> Value:
+    values = [evaluate(each, line, scene) for each in nodes]
+    if len(values) == 1:  # the variable that is called p, with an index
+        return _index(scene.variable("p") or Unknown("p is not set"), values)
+    for value in values:
+        if isinstance(value, Unknown):
+            return value
+    if len(values) != 6 or not all(is_number(value) and math.isfinite(value) for value in values):
+        return Unknown("a pose has six finite numbers")
+    return Pose(tuple(float(value) for value in values))
+
+
+def _call(node: Node, line: Line, scene: Scene) -> Value:
+    arguments, keywords = [], {}
+    for each in node.args[1] or ():
+        if each.op == "keyword":
+            keywords[word(each.args[0], line)] = evaluate(each.args[1], line, scene)
+        else:
+            arguments.append(evaluate(each, line, scene))
+    return scene.call(node, arguments, keywords, line)
+
+
+def built_in(name: str, arguments: list[Value], keywords: dict[str, Value]) -> Value | None:
+    """The value of a function of the language; None where there is no such function here."""
+    if name == "get_inverse_kin":
+        names = ("x", "qnear", "maxPositionError", "maxOrientationError", "tcp")
+        given = dict(zip(names, arguments, strict=False)) | keywords
+        return _joints_of(given)
+    if name not in PURE:
+        return None
+    for value in (*arguments, *keywords.values()):
+        if isinstance(value, Unknown):
+            return value
+    return Unknown(f"{name}() takes no names") if keywords else call_pure(name, arguments)
+
+
+def _joints_of(given: dict[str, Value]) -> Value:
+    pose, near, tool = given.get("x"), given.get("qnear"), given.get("tcp")
+    for value in (pose, near, tool):
+        if isinstance(value, Unknown):
+            return value
+    if not isinstance(pose, Pose) or not (tool is None or isinstance(tool, Pose)):
+        return Unknown("get_inverse_kin() is called with something else than it takes")
+    if near is not None and not (isinstance(near, tuple) and all(map(is_number, near)) and len(near) == 6):
+        return Unknown("get_inverse_kin() needs six joints to be near to")
+    return JointsOf(pose, None if near is None else tuple(float(each) for each in near), tool)
+
+
+def _arithmetic(op: str, one: Value, other: Value) -> Value:
+    if not (is_number(one) and is_number(other)):
+        return _cannot(op, one, other)
+    try:
+        value = ARITHMETIC[op](one, other)
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return Unknown(f"to {op} has no result here")
+    # Numbers without end grow without end when a program is followed, so only those that a float can hold go on.
+    return value if all_finite(value) and abs(value) < 1e300 else Unknown(f"to {op} has no result here")
+
+
+def _compare(sign: str, one: Value, other: Value) -> Value:
+    for value in (one, other):
+        if isinstance(value, (Unknown, JointsOf)):
+            return _cannot(sign, value)
+    ordered = is_number(one) and is_number(other)
+    if not ordered and sign not in ("==", "!="):
+        return _cannot(sign, one, other)
+    return COMPARE[sign](one, other)
+
+
+def _logic(op: str, one: Value, other: Value) -> Value:
+    decisive = {"and_": False, "or_": True}.get(op)
+    if decisive is not None and (one is decisive or other is decisive):
+        return decisive
+    if not (isinstance(one, bool) and isinstance(other, bool)):
+        return _cannot(op.rstrip("_"), one, other)
+    return {"and_": one and other, "or_": one or other, "xor_": one != other}[op]
+
+
+def _index(value: Value, indices: list[Value]) -> Value:
+    for index in indices:
+        if isinstance(value, (Unknown, JointsOf)) or isinstance(index, Unknown):
+            return _cannot("[]", value, index)
+        numbers = value.values if isinstance(value, Pose) else value
+        if not isinstance(numbers, tuple) or not is_number(index) or index != int(index):
+            return Unknown("there is nothing to be taken by this index")
+        if not 0 <= index < len(numbers):
+            return Unknown(f"there is no element {int(index)}")
+        value = numbers[int(index)]
+    return value
+
+
+def _cannot(what: str, *values: Value) -> Unknown:
+    for value in values:
+        if isinstance(value, Unknown):
+            return value
+    if any(isinstance(value, JointsOf) for value in values):
+        return Unknown("the joints that get_inverse_kin() finds are known to the controller only")
+    return Unknown(f"'{what}' is not followed for these values")

@@ -1,0 +1,189 @@
+"""A URScript program: its targets, what cannot be resolved, and its text with other targets in it."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from truepath.errors import InputError
+from truepath.lie import Array, make_pose
+from truepath.programs.motions import Motions
+from truepath.programs.urscript.follow import Follower
+from truepath.programs.urscript.moves import MOVES, Key, Move, literal
+from truepath.programs.urscript.tree import parse
+from truepath.programs.urscript.values import JointsOf, Pose, Value, is_number, matrix
+
+NO_TOOL = Pose((0.0,) * 6)
+LARGEST_FILE = 200_000_000
+SETTINGS = ("v", "a", "t", "r")
+FARTHEST_M = 1000.0
+
+
+@dataclass(frozen=True)
+class Unresolved:
+    """A move whose target cannot be told without running the program."""
+
+    line: int
+    text: str
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Script:
+    """A program.
+
+    Attributes:
+        file: name for messages.
+        text: all of it; bytes that are no UTF-8 are kept as surrogates.
+        motions: its targets, in the order in which they are written.
+        unresolved: moves that stay as they are.
+        sites: per target, the move that it belongs to and which of its targets it is.
+        sets_tool: whether the program says which tool it works with.
+    """
+
+    file: str
+    text: str
+    motions: Motions
+    unresolved: tuple[Unresolved, ...]
+    sites: tuple[tuple[Move, int], ...]
+    sets_tool: bool
+
+    def encoded(self, text: str) -> bytes:
+        """Text as bytes of a file."""
+        return text.encode("utf-8", "surrogateescape")
+
+
+def read_script(path: str | Path, tool: Sequence[float] | None = None) -> Script:
+    """Reads a program.
+
+    Args:
+        path: of the file.
+        tool: TCP in force before the program sets one, ``(6,)`` position in m and rotation vector in rad, on the
+            controller's tool flange; none if not stated.
+
+    Raises:
+        InputError: no such file, or no URScript; with line and column.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError("the program is too large", file=path, expected=f"{LARGEST_FILE} bytes at most")
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError("the program cannot be read", file=path, found=error.strerror or "unreadable") from None
+    return parse_script(raw, str(path), tool)
+
+
+def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> Script:
+    """The same for bytes in memory."""
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise InputError("the program is UTF-16", file=file, expected="UTF-8")
+    if b"\0" in raw:
+        line = raw[: raw.index(b"\0")].count(b"\n") + 1
+        raise InputError("this is no text", file=file, line=line, expected="a program", found="a zero byte")
+    text = raw.decode("utf-8", "surrogateescape")
+    start = NO_TOOL if tool is None else Pose(tuple(float(each) for each in tool))
+    moves = Follower(parse(text, file), file, start).moves.by_key
+    resolved: list[tuple[Key, Move]] = []
+    unresolved = []
+    for key in sorted(moves):
+        move = moves[key]
+        if move.problem is None:
+            resolved.append((key, move))
+        else:
+            unresolved.append(Unresolved(move.line.number, move.line.code.strip(), move.problem))
+    motions, sites = _motions(resolved, start, file)
+    return Script(file, text, motions, tuple(unresolved), sites, bool(np.any(motions.tool)) or tool is not None)
+
+
+def _motions(resolved: list[tuple[Key, Move]], start: Pose, file: str) -> tuple[Motions, tuple[tuple[Move, int], ...]]:
+    tools: dict[Value, int] = {start: 0}
+    sites: list[tuple[Move, int]] = []
+    last_site: dict[Key, int] = {}
+    by_shape: dict[int, list[int]] = {}
+    for number, (key, move) in enumerate(resolved):
+        if not move.targets:
+            by_shape.setdefault(id(move.statement.shape), []).append(number)
+        sites += [(move, which) for which in range(len(MOVES[move.name].kinds))]
+        last_site[key] = len(sites) - 1
+    count = len(sites)
+    first_site = np.array([last_site[key] - len(MOVES[move.name].kinds) + 1 for key, move in resolved], int)
+    q, pose, near = (np.full((count, 6), np.nan) for _ in range(3))
+    settings = {name: np.full(count, np.nan) for name in SETTINGS}
+    for numbers in by_shape.values():
+        _fill_literal([resolved[number][1] for number in numbers], first_site[numbers], q, pose, settings)
+    for at, (move, which) in enumerate(sites):
+        if not move.targets:
+            continue
+        target = move.targets[which]
+        if isinstance(target, Pose):
+            pose[at] = target.values
+        elif isinstance(target, JointsOf):
+            pose[at] = target.pose.values
+            near[at] = np.nan if target.q_near is None else target.q_near
+        else:
+            q[at] = target
+        for name in SETTINGS:
+            value = move.settings.get(name)
+            if is_number(value):
+                settings[name][at] = value
+    previous = np.full(count, -1)
+    kind, tool, line = (np.zeros(count, int) for _ in range(3))
+    for at, (move, which) in enumerate(sites):
+        kind[at] = MOVES[move.name].kinds[which]
+        line[at] = move.line.number
+        tool[at] = tools.setdefault(move.tool, len(tools)) if isinstance(move.tool, Pose) else 0
+        previous[at] = at - 1 if which else last_site.get(move.previous or (-1, -1), -1)
+    _require_sense(q, pose, line, file)
+    X_CT = make_pose(Rotation.from_rotvec(np.nan_to_num(pose[:, 3:])).as_matrix(), pose[:, :3])
+    motions = Motions(
+        kind=kind,
+        q_rad=q,
+        X_CT=X_CT,
+        q_near_rad=near,
+        tools=np.stack([matrix(each) for each in tools]),
+        tool=tool,
+        line=line,
+        previous=previous,
+        speed=settings["v"],
+        acceleration=settings["a"],
+        time_s=settings["t"],
+        blend_m=settings["r"],
+    )
+    return motions, tuple(sites)
+
+
+def _fill_literal(moves: list[Move], sites: Array, q: Array, pose: Array, settings: Mapping[str, Array]) -> None:
+    """Moves of one shape whose arguments are plain numbers."""
+    plain = literal(moves[0].statement.shape)
+    assert plain is not None
+    slots = [move.line.slots for move in moves]
+
+    def numbers(slot: int, sign: float) -> Array:
+        return sign * np.array([each[slot] for each in slots], dtype=float)
+
+    for which, (target, is_pose) in enumerate(zip(plain.targets, plain.is_pose, strict=True)):
+        (pose if is_pose else q)[sites + which] = np.stack([numbers(*each) for each in target], axis=1)
+    for name in SETTINGS:
+        if name in plain.settings:
+            for which in range(len(plain.targets)):
+                settings[name][sites + which] = numbers(*plain.settings[name])
+
+
+def _require_sense(q: Array, pose: Array, line: Array, file: str) -> None:
+    largest = np.nanmax(np.abs(np.concatenate([q, pose], axis=1)), axis=1, initial=0.0)
+    wrong = ~(largest < FARTHEST_M)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            "a target far from any robot",
+            file=file,
+            line=int(line[k]),
+            expected=f"numbers below {FARTHEST_M:g}, in m and rad",
+            found=f"{largest[k]:g}",
+        )
