@@ -40,6 +40,9 @@ class Motions:
         line: ``(N,)`` where the target is written, from 1.
         previous: ``(N,)`` index of the target from which the robot comes; -1 where that is not known: at the
             start, or where several lead here.
+        origin: ``(N,)`` index of one of the targets from which the robot can come, or came before a motion along a
+            line that cannot be resolved; -1 if there is none.
+        starts: ``(N,)`` True where the program can come from its start.
         speed, acceleration: ``(N,)`` of the tool in m/s and m/s^2, for JOINT of the leading joint in rad/s and rad/s^2.
         time_s: ``(N,)`` stated for the motion, instead of its speed.
         blend_m: ``(N,)`` radius.
@@ -53,6 +56,8 @@ class Motions:
     tool: Array
     line: Array
     previous: Array
+    origin: Array
+    starts: Array
     speed: Array
     acceleration: Array
     time_s: Array

@@ -13,7 +13,7 @@ from truepath.programs.urscript.evaluate import built_in, evaluate, word
 from truepath.programs.urscript.moves import LEAD_ELSEWHERE, MOVES, Key, Move, Moves, literal, named, problem_of
 from truepath.programs.urscript.names import DEFINES, called_anywhere, changed_by_threads
 from truepath.programs.urscript.source import Line
-from truepath.programs.urscript.state import State, joined
+from truepath.programs.urscript.state import ANYWHERE, AT_THE_START, State, joined
 from truepath.programs.urscript.syntax import Node
 from truepath.programs.urscript.tree import Statement
 from truepath.programs.urscript.values import JointsOf, Pose, Unknown, Value
@@ -61,7 +61,7 @@ class Follower:
         used = called_anywhere(program)
         for statement in program:
             if statement.node.op == "function" and word(statement.node.args[0], statement.line) not in used:
-                self._state.last = None
+                self._state.last = AT_THE_START
                 self._enter(statement, self._frame, [])
 
     # Statements
@@ -217,7 +217,7 @@ class Follower:
             tool = arguments[0] if arguments else keywords.get("pose", Unknown("set_tcp() names no pose"))
             self._state.tool = tool if isinstance(tool, (Pose, Unknown)) else Unknown("set_tcp() is not given a pose")
         if name in LEAD_ELSEWHERE:
-            self._state.last = None
+            self._state.last = ANYWHERE
         value = built_in(name, arguments, keywords)
         return Unknown(f"{name}() is known to the controller only") if value is None else value
 
@@ -226,12 +226,12 @@ class Follower:
             return
         self._called.add(name)
         before, moves = self._state.copy(), len(self.moves.by_key)
-        self._state.last = None
+        self._state.last = ANYWHERE
         self._enter(*self._frame.functions[name], [])
         moved = len(self.moves.by_key) > moves
         self._state.take(before)
         if moved:
-            self._state.last = None
+            self._state.last = ANYWHERE
 
     def _move(self, node: Node, name: str, arguments: list[Value], keywords: dict[str, Value], line: Line) -> Value:
         signature = MOVES[name]
@@ -251,7 +251,7 @@ class Follower:
     def _note(self, key: Key, move: Move) -> None:
         if not self._muted:
             self.moves.note(key, move)
-        self._state.last = key
+        self._state.last = frozenset({key})
 
     def _define(self, statements: list[Statement]) -> None:
         for statement in statements:
@@ -262,7 +262,9 @@ class Follower:
         """Follows a call; its value."""
         name = word(function.node.args[0], function.line)
         if self._depth >= DEEPEST_CALLS:
-            raise InputError(f"calls of {name}() are too deep to be followed", file=self._file, line=function.line.number)
+            raise InputError(
+                f"calls of {name}() are too deep to be followed", file=self._file, line=function.line.number
+            )
         self._scopes += 1
         frame = Frame((self._scopes, *home.scopes), dict(home.functions))
         taken = function.node.args[1] or () if function.node.op == "function" else ()

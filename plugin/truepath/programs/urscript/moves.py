@@ -1,4 +1,4 @@
-"""Moves of URScript: what their arguments mean, and every move that the program can make, noted while it is followed."""
+"""Moves of URScript: what their arguments mean, and every move that a program can make, noted while it is followed."""
 
 from __future__ import annotations
 
@@ -36,9 +36,8 @@ MOVES = {
 # After these nobody knows where the robot is.
 LEAD_ELSEWHERE = {
     "speedj", "speedl", "servoc", "servol", "freedrive_mode", "teach_mode", "end_teach_mode", "end_freedrive_mode",
-    "force_mode", "screw_driving", "position_deviation_warning", "path_offset_set", "conveyor_pulse_decode",
-    "track_conveyor_linear", "track_conveyor_circular", "stop_conveyor_tracking", "stopj", "stopl", "move_until_contact",
-    "move_to_contact", "optimovej", "optimovel", "moveJ", "moveL",
+    "force_mode", "screw_driving", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular",
+    "stop_conveyor_tracking", "stopj", "stopl", "optimovej", "optimovel",
 }  # fmt: skip
 
 
@@ -52,7 +51,8 @@ class Move:
         targets: value of each target; empty where all arguments are plain numbers, see ``literal``.
         settings: values of the other arguments that are stated.
         tool: in force.
-        previous: the move from which the robot comes, None where that is not known.
+        previous: the moves from which the robot can come.
+        origin: one of these that was made before this one; None if there is none.
         problem: why it cannot be resolved.
     """
 
@@ -62,8 +62,9 @@ class Move:
     targets: tuple[Value, ...]
     settings: dict[str, Value]
     tool: Value
-    previous: Key | None
+    previous: frozenset[Key]
     problem: str | None = None
+    origin: Key | None = None
 
     @property
     def line(self) -> Line:
@@ -76,8 +77,7 @@ class Move:
         if self.tool != other.tool:
             self.problem = self.problem or "it is made with several tools (set_tcp)"
         self.problem = self.problem or other.problem
-        if self.previous != other.previous:
-            self.previous = None
+        self.previous |= other.previous
         self.settings = {
             name: value for name, value in self.settings.items() if other.settings.get(name, None) == value
         }
@@ -92,6 +92,7 @@ class Moves:
     def note(self, key: Key, move: Move) -> None:
         known = self.by_key.get(key)
         if known is None:
+            move.origin = min((each for each in move.previous if each in self.by_key), default=None)
             self.by_key[key] = move
         else:
             known.merge(move)

@@ -158,10 +158,7 @@ def _via_line(move: Move, via: Via) -> str:
     if time is not None:
         texts["t"] = f"{via.share:.6f}*({texts['t']})"
     texts["r"] = f"{via.blend_m:.6f}"
-    stated = ", ".join(
-        value if name in signature.targets else f"{name}={value}"
-        for name, value in texts.items()
-    )
+    stated = ", ".join(value if name in signature.targets else f"{name}={value}" for name, value in texts.items())
     return f"{indentation}{move.name}({stated}){_line_end(line.whole)}"
 
 

@@ -15,6 +15,7 @@ from truepath.lie import Array, make_pose
 from truepath.programs.motions import Motions
 from truepath.programs.urscript.follow import Follower
 from truepath.programs.urscript.moves import MOVES, Key, Move, literal
+from truepath.programs.urscript.state import ELSEWHERE, START
 from truepath.programs.urscript.tree import parse
 from truepath.programs.urscript.values import JointsOf, Pose, Value, is_number, matrix
 
@@ -58,29 +59,33 @@ class Script:
         return text.encode("utf-8", "surrogateescape")
 
 
-def read_script(path: str | Path, tool: Sequence[float] | None = None) -> Script:
-    """Reads a program.
-
-    Args:
-        path: of the file.
-        tool: TCP in force before the program sets one, ``(6,)`` position in m and rotation vector in rad, on the
-            controller's tool flange; none if not stated.
+def read_bytes(path: str | Path) -> bytes:
+    """The content of a program file.
 
     Raises:
-        InputError: no such file, or no URScript; with line and column.
+        InputError: no such file, or one that is too large.
     """
     path = Path(path)
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise InputError("the program is too large", file=path, expected=f"{LARGEST_FILE} bytes at most")
-        raw = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise InputError("the program cannot be read", file=path, found=error.strerror or "unreadable") from None
-    return parse_script(raw, str(path), tool)
 
 
 def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> Script:
-    """The same for bytes in memory."""
+    """Reads a program.
+
+    Args:
+        raw: its bytes.
+        file: name for messages.
+        tool: TCP in force before the program sets one, ``(6,)`` position in m and rotation vector in rad, on the
+            controller's tool flange; none if not stated.
+
+    Raises:
+        InputError: this is no URScript; with line and column.
+    """
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise InputError("the program is UTF-16", file=file, expected="UTF-8")
     if b"\0" in raw:
@@ -97,11 +102,13 @@ def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> 
             resolved.append((key, move))
         else:
             unresolved.append(Unresolved(move.line.number, move.line.code.strip(), move.problem))
-    motions, sites = _motions(resolved, start, file)
+    motions, sites = _motions(resolved, moves, start, file)
     return Script(file, text, motions, tuple(unresolved), sites, bool(np.any(motions.tool)) or tool is not None)
 
 
-def _motions(resolved: list[tuple[Key, Move]], start: Pose, file: str) -> tuple[Motions, tuple[tuple[Move, int], ...]]:
+def _motions(
+    resolved: list[tuple[Key, Move]], moves: Mapping[Key, Move], start: Pose, file: str
+) -> tuple[Motions, tuple[tuple[Move, int], ...]]:
     tools: dict[Value, int] = {start: 0}
     sites: list[tuple[Move, int]] = []
     last_site: dict[Key, int] = {}
@@ -132,13 +139,21 @@ def _motions(resolved: list[tuple[Key, Move]], start: Pose, file: str) -> tuple[
             value = move.settings.get(name)
             if is_number(value):
                 settings[name][at] = value
-    previous = np.full(count, -1)
+    previous, origin = np.full(count, -1), np.full(count, -1)
     kind, tool, line = (np.zeros(count, int) for _ in range(3))
+    starts = np.zeros(count, bool)
     for at, (move, which) in enumerate(sites):
         kind[at] = MOVES[move.name].kinds[which]
         line[at] = move.line.number
         tool[at] = tools.setdefault(move.tool, len(tools)) if isinstance(move.tool, Pose) else 0
-        previous[at] = at - 1 if which else last_site.get(move.previous or (-1, -1), -1)
+        if which:
+            previous[at] = origin[at] = at - 1
+            continue
+        starts[at] = START in move.previous
+        if len(move.previous) == 1:
+            (only,) = move.previous
+            previous[at] = last_site.get(only, -1)
+        origin[at] = last_site.get(_last_resolved(move, moves), -1)
     _require_sense(q, pose, line, file)
     X_CT = make_pose(Rotation.from_rotvec(np.nan_to_num(pose[:, 3:])).as_matrix(), pose[:, :3])
     motions = Motions(
@@ -150,12 +165,22 @@ def _motions(resolved: list[tuple[Key, Move]], start: Pose, file: str) -> tuple[
         tool=tool,
         line=line,
         previous=previous,
+        origin=origin,
+        starts=starts,
         speed=settings["v"],
         acceleration=settings["a"],
-        time_s=settings["t"],
+        time_s=np.where(settings["t"] > 0, settings["t"], np.nan),  # zero: by speed and acceleration
         blend_m=settings["r"],
     )
     return motions, tuple(sites)
+
+
+def _last_resolved(move: Move, moves: Mapping[Key, Move]) -> Key:
+    """The move before one, past those along lines that cannot be resolved: on a line no posture changes."""
+    origin = move.origin
+    while origin is not None and moves[origin].problem is not None:
+        origin = moves[origin].origin if moves[origin].name in ("movel", "movep", "movec") else None
+    return origin or ELSEWHERE
 
 
 def _fill_literal(moves: list[Move], sites: Array, q: Array, pose: Array, settings: Mapping[str, Array]) -> None:

@@ -1,4 +1,4 @@
-"""Text of a program as logical lines: comments set aside, lines with open brackets joined, every character accounted for.
+"""Text of a program as logical lines: comments set aside, lines with open brackets joined, nothing lost.
 
 Programs repeat themselves: ten thousand lines differ in their numbers only. A line is therefore split into its shape
 and its slots (numbers, strings, and names with digits in them), and each shape is parsed once.

@@ -8,18 +8,18 @@ from truepath.programs.urscript.moves import Key
 from truepath.programs.urscript.values import Unknown, Value
 
 Name = tuple[int, str]  # scope, name
+START, ELSEWHERE = (0, 0), (0, 1)  # in place of a move: the program has just begun; nobody knows where the robot is
+AT_THE_START, ANYWHERE = frozenset({START}), frozenset({ELSEWHERE})
+MOST_WAYS = 16
 
 
 @dataclass(slots=True)
 class State:
-    """Values of variables by scope and name, the tool in force, and the move that was made last.
-
-    ``last`` is None where that is not known.
-    """
+    """Values of variables by scope and name, the tool in force, and the moves that may have been made last."""
 
     tool: Value
     values: dict[Name, Value] = field(default_factory=dict)
-    last: Key | None = None
+    last: frozenset[Key] = AT_THE_START
 
     def copy(self) -> State:
         return State(self.tool, dict(self.values), self.last)
@@ -33,8 +33,9 @@ def joined(states: list[State]) -> State:
     """What holds in all of these; what differs is not known."""
     first = states[0].copy()
     for other in states[1:]:
-        if first.last != other.last:
-            first.last = None
+        first.last |= other.last
+        if len(first.last) > MOST_WAYS:
+            first.last = frozenset({*sorted(first.last)[:MOST_WAYS], ELSEWHERE})
         if not _same(first.tool, other.tool):
             first.tool = Unknown("the program comes here with several tools (set_tcp)")
         if first.values == other.values:

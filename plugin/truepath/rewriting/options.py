@@ -1,0 +1,38 @@
+"""How a program is to be corrected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from truepath.controller import NOMINAL
+from truepath.correct import MAX_CORRECTION_MM
+from truepath.guards import MAX_AGE_DAYS
+
+PATH_TOLERANCE_MM = 0.05
+
+
+@dataclass(frozen=True)
+class RewriteOptions:
+    """What a user can choose.
+
+    Attributes:
+        express: corrected targets as ``joints`` or as ``poses``; None: as the line held them.
+        controller_kinematics: by which the controller turns poses into joints: see ``controller.controller_of``.
+        path_tolerance_mm: how far the tool may leave the straight line or arc between two targets before a target is
+            added on the way; None: nothing is added.
+        max_correction_mm: no target may move further.
+        cell: model of the cell in which collisions are looked for; None: nowhere.
+        start_rad: joints from which the program starts, where its first target is a pose.
+        tool: TCP in force before the program sets one: position in m, rotation vector in rad, on the tool flange.
+        max_age_days: a calibration older than this is worth a warning.
+    """
+
+    express: Literal["joints", "poses"] | None = None
+    controller_kinematics: str = NOMINAL
+    path_tolerance_mm: float | None = PATH_TOLERANCE_MM
+    max_correction_mm: float = MAX_CORRECTION_MM
+    cell: str | None = None
+    start_rad: tuple[float, ...] | None = None
+    tool: tuple[float, ...] | None = None
+    max_age_days: int = MAX_AGE_DAYS

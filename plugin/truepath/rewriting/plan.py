@@ -1,0 +1,108 @@
+"""What a program means: for each target the flange pose in space, and the joints with which the nominal robot takes it.
+
+Frames: B robot base, F flange; C controller's base, 0 its tool flange, T tool.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from truepath import lie
+from truepath.controller import Controller
+from truepath.errors import CorrectionError
+from truepath.guards import Finding
+from truepath.lie import Array
+from truepath.model import nominal_flange_poses
+from truepath.postures import follow_targets
+from truepath.programs.motions import Kind, Motions
+from truepath.robot import NominalRobot
+
+BY_TOOL = (Kind.LINEAR, Kind.PROCESS, Kind.THROUGH, Kind.ARC)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """N targets that can be corrected.
+
+    Attributes:
+        motions: of these targets; ``previous`` counts among them.
+        index: ``(N,)`` which targets of the program they are.
+        q_rad: ``(N, n)`` nominal joints.
+        q_today_rad: ``(N, n)`` joints that the controller takes today: others than the nominal ones where it turns
+            poses into joints by kinematics of its own.
+        X_BF: ``(N, 4, 4)`` flange poses that the program means.
+        posture_unknown: indices of targets of the program that no one posture can be told for.
+        findings: what is worth a warning.
+    """
+
+    motions: Motions
+    index: Array
+    q_rad: Array
+    q_today_rad: Array
+    X_BF: Array
+    posture_unknown: Array
+    findings: tuple[Finding, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+def flange_of(X_CT: Array, X_0T: Array, controller: Controller) -> Array:
+    """X_BF ``(N, 4, 4)`` of tool poses in the controller's base."""
+    return controller.X_BC @ X_CT @ lie.invert(X_0T) @ lie.invert(controller.X_F0)
+
+
+def tool_of(X_BF: Array, X_0T: Array, controller: Controller) -> Array:
+    """X_CT ``(N, 4, 4)`` of flange poses."""
+    return lie.invert(controller.X_BC) @ X_BF @ controller.X_F0 @ X_0T
+
+
+def plan_targets(
+    motions: Motions, robot: NominalRobot, controller: Controller, file: str, start_rad: tuple[float, ...] | None
+) -> Plan:
+    """Finds the joints of all targets.
+
+    Raises:
+        CorrectionError: a pose out of reach, or a joint target beyond a limit; with its line.
+    """
+    is_pose = motions.is_pose
+    X_BF = np.empty((len(motions), 4, 4))
+    X_BF[~is_pose] = nominal_flange_poses(robot, motions.q_rad[~is_pose])
+    X_BF[is_pose] = flange_of(motions.X_CT[is_pose], motions.X_0T[is_pose], controller)
+    near = motions.q_near_rad.copy()
+    if start_rad is not None:
+        near[is_pose & motions.starts & (motions.origin < 0) & np.isnan(near[:, 0])] = start_rad
+    # The posture stays what it was while the tool goes along a line or an arc.
+    by_tool = np.isin(motions.kind, BY_TOOL) & np.isnan(near[:, 0])
+    followed = follow_targets(robot, X_BF, motions.q_rad, near, motions.origin, is_straight=by_tool)
+    lost = ~followed.reached & ~followed.start_unknown & ~followed.ambiguous
+    if lost.any():
+        k = int(np.argmax(lost))
+        x, y, z = 1e3 * motions.X_CT[k, :3, 3]
+        raise CorrectionError(
+            "the target is out of reach",
+            file=file,
+            line=int(motions.line[k]),
+            expected=f"a pose that {robot.name} can take, in its base frame",
+            found=f"the tool at ({x:.1f}, {y:.1f}, {z:.1f}) mm",
+        )
+    doubtful = followed.start_unknown | followed.ambiguous
+    kept = np.flatnonzero(~doubtful)
+    chosen = select(motions, kept)
+    q = followed.q_rad[kept]
+    q_today = q.copy()
+    poses = np.flatnonzero(chosen.is_pose)
+    if len(poses):
+        today = controller.joints(chosen.X_CT[poses], chosen.X_0T[poses], q[poses])
+        q_today[poses] = np.where(today.converged[:, None], today.q_rad, q[poses])
+    return Plan(chosen, kept, q, q_today, X_BF[kept], np.flatnonzero(doubtful))
+
+
+def select(motions: Motions, kept: Array) -> Motions:
+    """Some of the targets; a target whose predecessor is not among them comes from nobody knows where."""
+    place = np.full(len(motions) + 1, -1)  # the last one is that of "not known"
+    place[kept] = np.arange(len(kept))
+    parts = {part.name: getattr(motions, part.name)[kept] for part in fields(motions) if part.name != "tools"}
+    return replace(motions, **{**parts, "previous": place[parts["previous"]], "origin": place[parts["origin"]]})
