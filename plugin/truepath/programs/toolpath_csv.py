@@ -36,19 +36,41 @@ class Toolpath:
     joint_columns: list[str]
     radians_per_unit: float
 
-    def with_joints(self, q_rad: Array) -> str:
-        """The text of the file with these joints ``(N, n)``; other cells, line ends and byte-order mark stay."""
-        header = list(self.table.header)
-        added = [name for name in self.joint_columns if name not in header]
-        place = {name: index for index, name in enumerate([*header, *added])}
+    def with_joints(self, q_rad: Array, changed: Array | None = None) -> str:
+        """The text of the file with these joints ``(N, n)``; other cells, line ends and byte-order mark stay.
+
+        Args:
+            q_rad: for all rows.
+            changed: ``(N,)`` rows whose joints are written; None for all. Without joint columns all are.
+        """
         decimals = 12 if self.radians_per_unit == 1.0 else 10
-        cells = np.char.mod(f"%.{decimals}f", q_rad / self.radians_per_unit)
-        columns = [place[name] for name in self.joint_columns]
+        return self._with(self.joint_columns, q_rad / self.radians_per_unit, decimals, changed)
+
+    def with_poses(self, X_BF: Array, changed: Array | None = None) -> str:
+        """The same with flange poses ``(N, 4, 4)`` in the pose columns of a path of poses."""
+        unit = next(unit for unit in LENGTH_UNITS if f"x_{unit}" in self.table.header)
+        columns = [f"{axis}_{unit}" for axis in "xyz"]
+        position = X_BF[:, :3, 3] / LENGTH_UNITS[unit]
+        quaternion = lie.to_quaternion(X_BF[:, :3, :3])
+        assert self.X_BF is not None
+        # Of the two quaternions of one orientation the one that is nearer to what was written.
+        written = self.table.numbers(QUATERNION_COLUMNS)
+        quaternion *= np.where(np.sum(quaternion * written, axis=1, keepdims=True) < 0, -1.0, 1.0)
+        return self._with([*columns, *QUATERNION_COLUMNS], np.hstack([position, quaternion]), 10, changed)
+
+    def _with(self, columns: list[str], values: Array, decimals: int, changed: Array | None) -> str:
+        header = list(self.table.header)
+        added = [name for name in columns if name not in header]
+        write = np.ones(len(values), bool) if changed is None or added else changed
+        place = {name: index for index, name in enumerate([*header, *added])}
+        cells = np.char.mod(f"%.{decimals}f", values)
+        places = [place[name] for name in columns]
         rows = []
-        for row, joints in zip(self.table.rows, cells, strict=True):
+        for row, numbers, is_written in zip(self.table.rows, cells, write.tolist(), strict=True):
             row = [*row, *[""] * len(added)]
-            for column, cell in zip(columns, joints, strict=True):
-                row[column] = str(cell)
+            if is_written:
+                for column, cell in zip(places, numbers, strict=True):
+                    row[column] = str(cell)
             rows.append(row)
         out = io.StringIO(newline="")
         if self.table.raw.startswith(codecs.BOM_UTF8):

@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from truepath import lie
 from truepath.controller import Controller, vectors_from_poses
 from truepath.lie import Array
-from truepath.programs.urscript.rewrite import NewTargets
-from truepath.programs.urscript.rewrite import Via as WrittenVia
+from truepath.programs.program import NewTargets
+from truepath.programs.program import Via as WrittenVia
 from truepath.rewriting.plan import Plan
 from truepath.rewriting.vias import Vias
 from truepath.rewriting.ways import Ways
@@ -71,8 +70,3 @@ def tool_errors_mm(X_BF_real: Array, X_BF_goal: Array, X_F0: Array, X_0T: Array)
     """``(N,)`` distance of the tool point from where it should be, for real flange poses ``(N, 4, 4)``."""
     X_FT = X_F0 @ X_0T
     return 1e3 * np.linalg.norm((X_BF_real @ X_FT)[:, :3, 3] - (X_BF_goal @ X_FT)[:, :3, 3], axis=1)
-
-
-def identity_tools(count: int) -> Array:
-    """``(count, 4, 4)``."""
-    return np.broadcast_to(lie.make_pose(), (count, 4, 4))

@@ -11,24 +11,22 @@ from typing import Any
 import numpy as np
 
 from truepath.calibration import Calibration
-from truepath.controller import controller_of
+from truepath.controller import Controller, controller_of
 from truepath.correct import Correction, correct
-from truepath.errors import CorrectionError, InputError
+from truepath.errors import CorrectionError
 from truepath.guards import Finding, calibration_findings, condense
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
-from truepath.programs.urscript.rewrite import can_be_added_before, rewritten
-from truepath.programs.urscript.script import Script, Unresolved, parse_script, read_bytes
+from truepath.programs.program import Program, Unresolved
 from truepath.rewriting.express import Expressed, express, tool_errors_mm
 from truepath.rewriting.named_robot import robot_named_in
+from truepath.rewriting.open import open_program
 from truepath.rewriting.options import RewriteOptions
 from truepath.rewriting.plan import Plan, plan_targets
 from truepath.rewriting.vias import Vias, choose_vias
 from truepath.rewriting.watch import watch
 from truepath.rewriting.ways import Ways, sample_ways
 from truepath.stamp import Stamp, refuse_if_stamped
-
-COMMENT = "#"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +111,7 @@ class RewrittenProgram:
 def rewrite_program(
     path: str | Path, calibration: Calibration, options: RewriteOptions | None = None, *, today: date | None = None
 ) -> RewrittenProgram:
-    """Corrects a URScript program.
+    """Corrects a program of any format that truepath reads.
 
     Args:
         path: of the program.
@@ -125,45 +123,50 @@ def rewrite_program(
         InputError: no program, corrected already, options that do not fit.
         CorrectionError: a guard forbids it; nothing may be written.
     """
-    return rewrite_script(read_bytes(path), str(path), calibration, options or RewriteOptions(), today)
-
-
-def rewrite_script(
-    raw: bytes, file: str, calibration: Calibration, options: RewriteOptions, today: date | None = None
-) -> RewrittenProgram:
-    """The same for a program in memory."""
-    today = today or datetime.now(timezone.utc).date()
-    script = parse_script(raw, file, options.tool)
-    refuse_if_stamped(script.text, file, COMMENT)
-    model, robot = calibration.model, calibration.model.robot
-    if robot.num_joints != 6:
-        raise InputError("URScript is for six joints", file=file, found=f"{robot.name} with {robot.num_joints}")
+    options = options or RewriteOptions()
+    robot, region = calibration.model.robot, calibration.region.region()
     controller = controller_of(robot, options.controller_kinematics)
-    plan = plan_targets(script.motions, robot, controller, file, options.start_rad)
-    unresolved = tuple(sorted([*script.unresolved, *_without_posture(script, plan)], key=lambda each: each.line))
+    program = open_program(path, robot, region, controller, options.tool)
+    return rewrite(program, calibration, controller, options, today=today)
+
+
+def rewrite(
+    program: Program,
+    calibration: Calibration,
+    controller: Controller,
+    options: RewriteOptions,
+    *,
+    today: date | None = None,
+) -> RewrittenProgram:
+    """The same for a program that was read."""
+    today = today or datetime.now(timezone.utc).date()
+    file, motions, model = program.file, program.motions, calibration.model
+    if program.comment is not None:
+        refuse_if_stamped(program.text, file, program.comment)
+    plan = plan_targets(motions, model.robot, controller, file, options.start_rad)
     correction = _corrected(plan, calibration, options, file)
     X_end = controller.tool_poses(correction.q_rad, plan.motions.X_0T)
     ways, findings = sample_ways(plan, model, controller, options.max_correction_mm, file)
-    vias = choose_vias(
-        plan, ways, X_end, options.path_tolerance_mm, lambda at: can_be_added_before(script, int(plan.index[at]))
-    )
+    tolerance_mm = options.path_tolerance_mm
+    vias = choose_vias(plan, ways, X_end, tolerance_mm, lambda at: program.can_be_added_before(int(plan.index[at])))
     findings = [
-        *calibration_findings(calibration, robot_named_in(script.text), today, options.max_age_days),
+        *calibration_findings(calibration, robot_named_in(program.text), today, options.max_age_days),
         *findings,
-        *_too_far_off(plan, ways, vias, options.path_tolerance_mm),
+        *_too_far_off(plan, ways, vias, tolerance_mm),
         *watch(plan, correction.q_rad, ways, calibration, options.cell),
     ]
     _refuse(findings, file)
     expressed = express(plan, correction.q_rad, ways, vias, controller, options.express)
-    content = _written(script, expressed, raw, calibration, today)
-    goal = model.goal_flange_poses(plan.X_BF)
-    before, after = (
-        tool_errors_mm(model.flange_poses(q), goal, controller.X_F0, plan.motions.X_0T)
-        for q in (plan.q_today_rad, correction.q_rad)
-    )
+    before, after = correction.error_before_mm, correction.error_after_mm
+    if program.states_tool and len(plan):
+        goal = model.goal_flange_poses(plan.X_BF)
+        before, after = (
+            tool_errors_mm(model.flange_poses(q), goal, controller.X_F0, plan.motions.X_0T)
+            for q in (plan.q_today_rad, correction.q_rad)
+        )
     return RewrittenProgram(
         file=file,
-        content=content,
+        content=_written(program, expressed, calibration, today),
         changed=len(expressed.targets.index),
         plan=plan,
         correction=correction,
@@ -171,22 +174,21 @@ def rewrite_script(
         error_after_mm=after,
         ways=ways,
         vias=vias,
-        unresolved=unresolved,
+        unresolved=tuple(sorted([*program.unresolved, *_without_posture(program, plan)], key=lambda each: each.line)),
         findings=tuple(findings),
         cell=options.cell,
     )
 
 
-def _without_posture(script: Script, plan: Plan) -> list[Unresolved]:
+def _without_posture(program: Program, plan: Plan) -> list[Unresolved]:
     found = []
     for at in plan.posture_unknown.tolist():
-        line = script.sites[at][0].line
         why = (
-            "nobody knows in which posture the robot comes here: no joints are stated before (a start posture can be)"
-            if script.motions.starts[at]
+            "nobody knows in which posture the robot starts: no joints are stated before (--start-deg can state them)"
+            if program.motions.starts[at]
             else "in which posture the robot takes this pose cannot be told"
         )
-        found.append(Unresolved(line.number, line.code.strip(), why))
+        found.append(Unresolved(int(program.motions.line[at]), program.statement(at), why))
     return found
 
 
@@ -232,11 +234,13 @@ def _refuse(findings: list[Finding], file: str) -> None:
         )
 
 
-def _written(script: Script, expressed: Expressed, raw: bytes, calibration: Calibration, today: date) -> bytes:
+def _written(program: Program, expressed: Expressed, calibration: Calibration, today: date) -> bytes:
     if not len(expressed.targets.index) and not expressed.vias:
-        return raw  # as it was, to the byte
-    stamp = Stamp.of(raw, calibration.to_json().encode(), today).line(COMMENT)
-    return script.encoded(rewritten(script, expressed.targets, expressed.vias, stamp))
+        return program.raw  # as it was, to the byte
+    header = ""
+    if program.comment is not None:
+        header = Stamp.of(program.raw, calibration.to_json().encode(), today).line(program.comment)
+    return program.rewritten(expressed.targets, expressed.vias, header)
 
 
 def _statistics(values: Array) -> dict[str, float] | None:

@@ -80,10 +80,10 @@ def choose_vias(
         before[way] = after[way] = _off_an_arc(points, middle)
         if tolerance_mm is None or before[way] <= tolerance_mm or not may_add(int(ways.target[way])):
             continue
-        parts, after[way] = _divided(points, tolerance_mm)
-        if parts == 1:  # no better than as it was
-            after[way] = before[way]
+        parts, off = _divided(points, tolerance_mm)
+        if off >= before[way]:  # no better than as it was
             continue
+        after[way] = off
         _add_arcs(plan.motions, ways, way, arc.through, parts, added, through)
     if tolerance_mm is not None:
         for way in np.flatnonzero(before > tolerance_mm).tolist():

@@ -194,6 +194,25 @@ def _index(value: Value, indices: list[Value]) -> Value:
     return value
 
 
+def with_element(value: Value, indices: list[Value], element: Value) -> Value:
+    """A list or pose with one element replaced."""
+    if not indices:
+        return element
+    index, inner = indices[0], _index(value, indices[:1])
+    for each in (value, index, inner, element):
+        if isinstance(each, (Unknown, JointsOf)):
+            return _cannot("[]", each)
+    numbers = value.values if isinstance(value, Pose) else value
+    changed = with_element(inner, indices[1:], element)
+    if isinstance(changed, Unknown):
+        return changed
+    if not isinstance(value, Pose):
+        return (*numbers[: int(index)], changed, *numbers[int(index) + 1 :])
+    if not is_number(changed) or not math.isfinite(changed):
+        return Unknown("a pose has six finite numbers")
+    return Pose((*numbers[: int(index)], float(changed), *numbers[int(index) + 1 :]))
+
+
 def _cannot(what: str, *values: Value) -> Unknown:
     for value in values:
         if isinstance(value, Unknown):

@@ -9,8 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from truepath.errors import InputError
-from truepath.programs.urscript.evaluate import built_in, evaluate, word
-from truepath.programs.urscript.moves import LEAD_ELSEWHERE, MOVES, Key, Move, Moves, literal, named, problem_of
+from truepath.programs.urscript.evaluate import built_in, evaluate, with_element, word
+from truepath.programs.urscript.moves import (
+    LEAD_ELSEWHERE,
+    MOVES,
+    Key,
+    Literal,
+    Move,
+    Moves,
+    literal,
+    named,
+    problem_of,
+)
 from truepath.programs.urscript.names import DEFINES, called_anywhere, changed_by_threads
 from truepath.programs.urscript.source import Line
 from truepath.programs.urscript.state import ANYWHERE, AT_THE_START, State, joined
@@ -55,14 +65,14 @@ class Follower:
     def _run(self, program: list[Statement]) -> None:
         self._define(program)
         self._block(program)
-        if self._called & self._frame.functions.keys():
+        if self.moves.by_key or self._called & self._frame.functions.keys():
             return
-        # Nothing is called: the definitions are the programs. Those that others call are not.
+        # Nothing is done: the definitions are the programs. Those that others call are not.
         used = called_anywhere(program)
         for statement in program:
             if statement.node.op == "function" and word(statement.node.args[0], statement.line) not in used:
                 self._state.last = AT_THE_START
-                self._enter(statement, self._frame, [])
+                self._enter(statement, self._frame, [], {})
 
     # Statements
 
@@ -81,8 +91,7 @@ class Follower:
         if op == "expression":
             plain = literal(statement.shape)
             if plain is not None and plain.name not in self._frame.functions:
-                key = (statement.line.number, plain.node.start)
-                self._note(key, Move(plain.name, plain.node, statement, (), {}, self._state.tool, self._state.last))
+                self._note_literal(plain, statement)
             else:
                 self._value(statement.node.args[0], statement)
         elif op == "assign":
@@ -111,21 +120,27 @@ class Follower:
     def _assign(self, statement: Statement) -> None:
         scope, target, expression = statement.node.args
         value = self._value(expression, statement)
-        path: list[Node] = []
+        path: list[Value] = []
         while target.op in ("index", "member"):
-            path.append(target)
+            path = [self._element(node, statement) for node in target.args[1:]] + path
             target = target.args[0]
-        if target.op == "pose" and len(target.args[1] or ()) == 1:
-            path.append(target)
+        if target.op == "pose" and len(target.args[1] or ()) == 1:  # the variable that is called p, with an index
+            path = [self._element(target.args[1][0], statement), *path]
             name = "p"
         elif target.op == "name":
             name = word(target, statement.line)
         else:
             raise InputError("nothing can be put there", file=self._file, line=statement.line.number, expected="a name")
-        if path:
-            value = Unknown(f"{name} is changed element by element")
         where = self._place(name) if scope is None else (self._scope_of(statement), name)
+        if path:
+            before = self._state.values.get(where)
+            value = with_element(Unknown(f"{name} is not set") if before is None else before, path, value)
         self._state.values[where] = value
+
+    def _element(self, node: Node | str, statement: Statement) -> Value:
+        if isinstance(node, str) or node.op == "token":
+            return Unknown("members of a struct are not followed")
+        return self._value(node, statement)
 
     def _scope_of(self, statement: Statement) -> int:
         return 0 if statement.node.args[0] == "global" else self._frame.scopes[0]
@@ -210,7 +225,7 @@ class Follower:
         defined = self._frame.functions.get(name)
         if defined is not None:
             self._called.add(name)
-            return self._enter(*defined, arguments)
+            return self._enter(*defined, arguments, keywords)
         if name in MOVES:
             return self._move(node, name, arguments, keywords, line)
         if name == "set_tcp":
@@ -227,7 +242,7 @@ class Follower:
         self._called.add(name)
         before, moves = self._state.copy(), len(self.moves.by_key)
         self._state.last = ANYWHERE
-        self._enter(*self._frame.functions[name], [])
+        self._enter(*self._frame.functions[name], [], {})
         moved = len(self.moves.by_key) > moves
         self._state.take(before)
         if moved:
@@ -248,6 +263,12 @@ class Follower:
         self._note(key, Move(name, node, self._statement, targets, given, tool, self._state.last, problem))
         return Unknown(f"{name}() has no value")
 
+    def _note_literal(self, plain: Literal, statement: Statement) -> None:
+        tool = self._state.tool
+        problem = f"the tool is not known: {tool.why}" if isinstance(tool, Unknown) and any(plain.is_pose) else None
+        key = (statement.line.number, plain.node.start)
+        self._note(key, Move(plain.name, plain.node, statement, (), {}, tool, self._state.last, problem))
+
     def _note(self, key: Key, move: Move) -> None:
         if not self._muted:
             self.moves.note(key, move)
@@ -258,7 +279,7 @@ class Follower:
             if statement.node.op in DEFINES:
                 self._frame.functions[word(statement.node.args[0], statement.line)] = (statement, self._frame)
 
-    def _enter(self, function: Statement, home: Frame, arguments: list[Value]) -> Value:
+    def _enter(self, function: Statement, home: Frame, arguments: list[Value], keywords: dict[str, Value]) -> Value:
         """Follows a call; its value."""
         name = word(function.node.args[0], function.line)
         if self._depth >= DEEPEST_CALLS:
@@ -269,8 +290,13 @@ class Follower:
         frame = Frame((self._scopes, *home.scopes), dict(home.functions))
         taken = function.node.args[1] or () if function.node.op == "function" else ()
         for index, parameter in enumerate(taken):
-            value = arguments[index] if index < len(arguments) else Unknown(f"{name}() is called with too little")
-            self._state.values[(self._scopes, word(parameter, function.line))] = value
+            default = None
+            if parameter.op == "keyword":
+                default = self._value(parameter.args[1], function)
+            called = word(parameter.args[0] if parameter.op == "keyword" else parameter, function.line)
+            missing = Unknown(f"{name}() is called with too little") if default is None else default
+            value = arguments[index] if index < len(arguments) else keywords.get(called, missing)
+            self._state.values[(self._scopes, called)] = value
         outer, self._frame = self._frame, frame
         self._depth += 1
         self._define(function.body)

@@ -3,79 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from truepath.lie import Array
+from truepath.programs.program import NewTargets, Via
 from truepath.programs.urscript.moves import MOVES, Literal, Move, literal, named
-from truepath.programs.urscript.script import Script
 from truepath.programs.urscript.syntax import Node, columns
 from truepath.programs.urscript.values import JointsOf
 
+Sites = Sequence[tuple[Move, int]]  # per target, the move that it belongs to and which of its targets it is
 DECIMALS = 9  # a nanometre, a nanoradian
 JOINTS_TEXT = "[" + ", ".join([f"%.{DECIMALS}f"] * 6) + "]"
 
 
-@dataclass(frozen=True, eq=False)
-class NewTargets:
-    """Targets to be written.
-
-    Attributes:
-        index: ``(K,)`` which targets of the program.
-        values: ``(K, 6)`` joints in rad, or position in m and rotation vector in rad.
-        is_pose: ``(K,)``.
-        q_near_rad: ``(K, 6)`` joints that a pose stands for.
-    """
-
-    index: Array
-    values: Array
-    is_pose: Array
-    q_near_rad: Array
-
-
-@dataclass(frozen=True)
-class Via:
-    """A target to be added on the way to another one.
-
-    Attributes:
-        before: index of the target of the program on whose way it lies (the first one of its move).
-        values: numbers of each target of the move, as ``NewTargets.values``.
-        is_pose: whether these are poses.
-        blend_m: radius around it.
-        share: of the motion that ends here; a stated time is split by it.
-    """
-
-    before: int
-    values: tuple[tuple[float, ...], ...]
-    is_pose: bool
-    blend_m: float
-    share: float
-
-
-def rewritten(script: Script, new: NewTargets, vias: Sequence[Via] = (), header: str = "") -> str:
+def rewritten(text: str, sites: Sites, new: NewTargets, vias: Sequence[Via] = (), header: str = "") -> str:
     """The program with new targets, with vias added before their moves, and with a header line at its start."""
     texts = _texts(new)
     edits: list[tuple[int, int, str]] = []
-    for at, text, is_pose, near in zip(new.index.tolist(), texts, new.is_pose.tolist(), new.q_near_rad, strict=True):
-        edits.append(_edit(script, at, text, is_pose, near))
+    for at, text_of_it, is_pose, near in zip(
+        new.index.tolist(), texts, new.is_pose.tolist(), new.q_near_rad, strict=True
+    ):
+        edits.append(_edit(sites[at], text_of_it, is_pose, near))
     by_move: dict[int, list[Via]] = {}
     for via in vias:
         by_move.setdefault(via.before, []).append(via)
     for at, added in by_move.items():
-        move = script.sites[at][0]
+        move = sites[at][0]
         edits.append((move.line.start, move.line.start, "".join(_via_line(move, via) for via in added)))
         edits += _rest_of_the_time(move, 1.0 - sum(via.share for via in added))
-    text = _applied(script.text, edits)
+    text = _applied(text, edits)
     if header:
         mark = "\ufeff" if text.startswith("\ufeff") else ""
-        text = f"{mark}{header}{_line_end(script.text)}{text[len(mark) :]}"
+        text = f"{mark}{header}{_line_end(text)}{text[len(mark) :]}"
     return text
 
 
-def can_be_added_before(script: Script, at: int) -> bool:
-    """Whether a line can be added before the move of a target: it stands alone on its line."""
-    move = script.sites[at][0]
+def stands_alone(move: Move) -> bool:
+    """Whether nothing else stands on the line of a move, so that another line can be put before it."""
     node = move.statement.node
     return move.statement.alone and node.op == "expression" and node.args[0] is move.node
 
@@ -102,8 +67,8 @@ def _texts(new: NewTargets) -> list[str]:
     ]
 
 
-def _edit(script: Script, at: int, text: str, is_pose: bool, near: Array) -> tuple[int, int, str]:
-    move, which = script.sites[at]
+def _edit(site: tuple[Move, int], text: str, is_pose: bool, near: Array) -> tuple[int, int, str]:
+    move, which = site
     shape, line = move.statement.shape, move.line
     plain = literal(shape) if not move.targets else None
     node = _target_node(plain, move, which)

@@ -12,9 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from truepath.errors import InputError
 from truepath.lie import Array, make_pose
-from truepath.programs.motions import Motions
+from truepath.programs.motions import Kind, Motions
+from truepath.programs.program import NewTargets, Unresolved, Via
 from truepath.programs.urscript.follow import Follower
 from truepath.programs.urscript.moves import MOVES, Key, Move, literal
+from truepath.programs.urscript.rewrite import rewritten, stands_alone
 from truepath.programs.urscript.state import ELSEWHERE, START
 from truepath.programs.urscript.tree import parse
 from truepath.programs.urscript.values import JointsOf, Pose, Value, is_number, matrix
@@ -25,38 +27,40 @@ SETTINGS = ("v", "a", "t", "r")
 FARTHEST_M = 1000.0
 
 
-@dataclass(frozen=True)
-class Unresolved:
-    """A move whose target cannot be told without running the program."""
-
-    line: int
-    text: str
-    why: str
-
-
 @dataclass(frozen=True, eq=False)
 class Script:
-    """A program.
+    """A program; see ``programs.program.Program``.
 
     Attributes:
         file: name for messages.
-        text: all of it; bytes that are no UTF-8 are kept as surrogates.
+        raw: its bytes.
+        text: the same; bytes that are no UTF-8 are kept as surrogates.
         motions: its targets, in the order in which they are written.
         unresolved: moves that stay as they are.
         sites: per target, the move that it belongs to and which of its targets it is.
-        sets_tool: whether the program says which tool it works with.
+        states_tool: whether it is known with which tool it works.
     """
 
     file: str
+    raw: bytes
     text: str
     motions: Motions
     unresolved: tuple[Unresolved, ...]
     sites: tuple[tuple[Move, int], ...]
-    sets_tool: bool
+    states_tool: bool
+    comment: str | None = "#"
 
-    def encoded(self, text: str) -> bytes:
-        """Text as bytes of a file."""
-        return text.encode("utf-8", "surrogateescape")
+    def statement(self, at: int) -> str:
+        """The line of a target without its comment."""
+        return self.sites[at][0].line.code.strip()
+
+    def can_be_added_before(self, at: int) -> bool:
+        """Whether the move of a target stands alone on its line."""
+        return stands_alone(self.sites[at][0])
+
+    def rewritten(self, new: NewTargets, vias: Sequence[Via], header: str) -> bytes:
+        """Its content with new targets, lines added before their moves, and a first line."""
+        return rewritten(self.text, self.sites, new, vias, header).encode("utf-8", "surrogateescape")
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -103,7 +107,7 @@ def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> 
         else:
             unresolved.append(Unresolved(move.line.number, move.line.code.strip(), move.problem))
     motions, sites = _motions(resolved, moves, start, file)
-    return Script(file, text, motions, tuple(unresolved), sites, bool(np.any(motions.tool)) or tool is not None)
+    return Script(file, raw, text, motions, tuple(unresolved), sites, bool(np.any(motions.tool)) or tool is not None)
 
 
 def _motions(
@@ -170,7 +174,7 @@ def _motions(
         speed=settings["v"],
         acceleration=settings["a"],
         time_s=np.where(settings["t"] > 0, settings["t"], np.nan),  # zero: by speed and acceleration
-        blend_m=settings["r"],
+        blend_m=np.where(kind == Kind.THROUGH, np.nan, settings["r"]),
     )
     return motions, tuple(sites)
 

@@ -141,7 +141,7 @@ def _node(tree: Tree[Token] | Token | None, slots: dict[int, int]) -> Any:
         return Node(str(tree.data), (str(token),), slots.get(at, -1), at, token.end_pos or at)
     args = []
     for child in children:
-        if not isinstance(child, Token) and child is not None and child.data in ("list", "arguments", "names"):
+        if not isinstance(child, Token) and child is not None and child.data in ("list", "arguments"):
             args.append(tuple(_node(each, slots) for each in child.children))
         else:
             args.append(_node(child, slots))
