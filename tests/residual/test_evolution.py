@@ -70,10 +70,10 @@ def test_trials_have_the_size_of_the_best_whatever_the_others_have():
 
 def test_what_others_have_beyond_the_length_of_the_best_is_disregarded():
     population, settings = population_of([3, 9, 9, 9]), replace(SMALL, crossover=1.0)
-    more = population.hidden.clone()
-    more[1:, 3:] = 1e6
-    changed = replace(population, hidden=more, output=population.output.clone())
-    changed.output[1:, :, 3:] = -1e6
+    more = population.genes.clone()
+    more[1:, 3:, :4] = 1e6
+    more[1:, 3:, 4:] = -1e6
+    changed = replace(population, genes=more)
     plain, other = (trials(each, 0, settings, generator_for(0, 1, CPU)) for each in (population, changed))
     for number in range(4):
         for a, b in zip(genes(plain, number).values(), genes(other, number).values(), strict=True):
@@ -83,7 +83,7 @@ def test_what_others_have_beyond_the_length_of_the_best_is_disregarded():
 def test_what_others_lack_of_the_length_of_the_best_is_drawn_from_minus_1_to_1():
     """Against a best of zeros the mutant's neurons beyond all others are half the difference of two random numbers."""
     population = population_of([8, 2, 2, 2, 2, 2, 2, 2])
-    zero = [torch.zeros_like(part) for part in (population.hidden, population.output, population.bias)]
+    zero = [torch.zeros_like(part) for part in (population.genes, population.bias)]
     population = Population(*zero, population.sizes)
     found = []
     for generation in range(200):

@@ -58,6 +58,7 @@ def evolve(
     seed: int,
     *,
     device: str = "cpu",
+    threads: int = 1,
     start: State | None = None,
     observe: Observer = lambda _: None,
 ) -> State:
@@ -67,15 +68,16 @@ def evolve(
         x: ``(N, d)`` inputs, scaled to about -1 to 1.
         target: ``(N, k)`` outputs, scaled to about one.
         device: ``cpu`` or ``cuda``.
+        threads: on which networks are evaluated, at most; the result does not depend on their number.
         start: where an earlier run was interrupted.
         observe: told about each generation.
     """
     where = torch.device(device)
     x1 = with_ones(torch.tensor(x, dtype=torch.float32, device=where))
     wanted = torch.tensor(np.ascontiguousarray(target.T), dtype=torch.float32, device=where)
-    state = first_generation(x1, wanted, settings, seed) if start is None else start
+    state = first_generation(x1, wanted, settings, seed, threads) if start is None else start
     while not has_ended(state, settings):
-        state = next_generation(state, x1, wanted, settings, seed)
+        state = next_generation(state, x1, wanted, settings, seed, threads)
         observe(state)
     return state
 
@@ -89,29 +91,29 @@ def has_ended(state: State, settings: Settings) -> bool:
     )
 
 
-def first_generation(x1: Tensor, target: Tensor, settings: Settings, seed: int) -> State:
+def first_generation(x1: Tensor, target: Tensor, settings: Settings, seed: int, threads: int = 1) -> State:
     """Random networks of all hidden sizes."""
     generator = generator_for(seed, 0, x1.device)
     sizes = torch.randint(
         settings.smallest, settings.largest + 1, (settings.individuals,), generator=generator, device=x1.device
     )
     population = Population.random(sizes, settings.largest, len(x1) - 1, len(target), generator, dtype=target.dtype)
-    error = population.mean_squared_error(x1, target)
+    error = population.mean_squared_error(x1, target, threads)
     return State(population, error, generation=0, stale=0, reference=float(error.min()))
 
 
-def next_generation(state: State, x1: Tensor, target: Tensor, settings: Settings, seed: int) -> State:
+def next_generation(state: State, x1: Tensor, target: Tensor, settings: Settings, seed: int, threads: int = 1) -> State:
     """Mutation, crossover, greedy selection; from time to time the hidden sizes step."""
     generation = state.generation + 1
     generator = generator_for(seed, generation, x1.device)
     trial = trials(state.population, state.best, settings, generator)
-    error = trial.mean_squared_error(x1, target)
+    error = trial.mean_squared_error(x1, target, threads)
     better = error < state.error  # eq. 21
     population, error = state.population.where(better, trial), torch.where(better, error, state.error)
     best = float(error.min())
     if best > settings.target and generation % settings.sizes_every == 0:
         population, changed = stepped(population, int(torch.argmin(error)), settings, generator)
-        error = torch.where(changed, population.mean_squared_error(x1, target), error)
+        error = torch.where(changed, population.mean_squared_error(x1, target, threads), error)
     fell = best < (1.0 - WORTH_MENTIONING) * state.reference
     return State(population, error, generation, 0 if fell else state.stale + 1, best if fell else state.reference)
 
@@ -126,33 +128,29 @@ def trials(population: Population, best: int, settings: Settings, generator: tor
     size, device = int(population.sizes[best]), population.sizes.device
     a = torch.randint(count, (count,), generator=generator, device=device)
     b = (a + torch.randint(1, count, (count,), generator=generator, device=device)) % count
-    has = population.has()[:, :size]
-    hidden, output, bias = population.hidden[:, :size], population.output[:, :, :size], population.bias
-    grown = [_unified(hidden, has[:, :, None], who, generator) for who in (a, b)]
-    mutant_hidden = hidden[best] + settings.factor * (grown[0] - grown[1])
-    grown = [_unified(output, has[:, None, :], who, generator) for who in (a, b)]
-    mutant_output = output[best] + settings.factor * (grown[0] - grown[1])
-    mutant_bias = bias[best] + settings.factor * (bias[a] - bias[b])
-
-    def crossed(own: Tensor, mutant: Tensor, has_it: Tensor | None) -> Tensor:
-        keep = torch.rand(own.shape, generator=generator, device=device) > settings.crossover
-        return torch.where(keep if has_it is None else keep & has_it, own, mutant)
-
-    pad = (0, room - size)
+    genes, bias, lacks = population.genes[:, :size], population.bias, ~population.has()[:, :size]
+    difference = _unified(genes, lacks, a, generator).sub_(_unified(genes, lacks, b, generator))
+    mutant = torch.add(genes[best], difference, alpha=settings.factor)
+    mutant_bias = torch.add(bias[best], bias[a] - bias[b], alpha=settings.factor)
+    keep, keep_bias = (
+        torch.rand(own.shape, generator=generator, device=device) > settings.crossover for own in (genes, bias)
+    )
+    if lacks.any():
+        keep[lacks] = False
     return Population(
-        torch.nn.functional.pad(crossed(hidden, mutant_hidden, has[:, :, None]), (0, 0, *pad)),
-        torch.nn.functional.pad(crossed(output, mutant_output, has[:, None, :]), pad),
-        crossed(bias, mutant_bias, None),
+        torch.nn.functional.pad(torch.where(keep, genes, mutant), (0, 0, 0, room - size)),
+        torch.where(keep_bias, bias, mutant_bias),
         torch.full_like(population.sizes, size),
     )
 
 
-def _unified(genes: Tensor, has: Tensor, who: Tensor, generator: torch.Generator) -> Tensor:
+def _unified(genes: Tensor, lacks: Tensor, who: Tensor, generator: torch.Generator) -> Tensor:
     """The genes of some individuals in the length of the best: random where an individual has none."""
-    missing = ~has[who]
-    if not missing.any():
-        return genes[who]
-    return torch.where(missing, uniform(genes.shape, generator, genes.device, genes.dtype), genes[who])
+    unified, missing = genes.index_select(0, who), lacks.index_select(0, who)
+    count = int(missing.sum())
+    if count:
+        unified[missing] = uniform((count, genes.shape[2]), generator, genes.device, genes.dtype)
+    return unified
 
 
 def stepped(
@@ -166,6 +164,7 @@ def stepped(
     larger = sizes > sizes[best]
     new = torch.where(larger, sizes - 1, sizes + 1).clamp(settings.smallest, settings.largest)
     fresh = population.has().logical_not()[:, :, None]
-    listening = uniform(tuple(population.hidden.shape), generator, sizes.device, population.hidden.dtype)
+    listening = uniform(tuple(population.hidden.shape), generator, sizes.device, population.genes.dtype)
     hidden = torch.where(fresh, listening, population.hidden)
-    return replace(population, hidden=hidden, sizes=new).trimmed(), new < sizes
+    grown = torch.cat([hidden, population.output.mT], dim=2)
+    return replace(population, genes=grown, sizes=new).trimmed(), new < sizes

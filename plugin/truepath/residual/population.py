@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 
+from truepath.residual import evaluation
 from truepath.residual.network import Network, Tensor, activations, stacked
 
-CACHE_BYTES = 640 << 10  # activations of so many networks at a time stay in a core's own cache
+CPU_BYTES = 2 << 20  # activations of so many networks at a time: few enough for the cache, enough for a thread to do
 GPU_BYTES = 1 << 30
+
+Rows = slice | Tensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,14 +22,13 @@ class Population:
     """P networks of d inputs and k outputs, padded to the same number L of hidden neurons.
 
     Attributes:
-        hidden: ``(P, L, d + 1)``.
-        output: ``(P, k, L)``, zero for neurons that a network does not have.
+        genes: ``(P, L, d + 1 + k)`` neuron by neuron as in eq. 18: input weights, threshold, output weights; the last
+            are zero for neurons that a network does not have.
         bias: ``(P, k)``.
         sizes: ``(P,)`` number of hidden neurons of each.
     """
 
-    hidden: Tensor
-    output: Tensor
+    genes: Tensor
     bias: Tensor
     sizes: Tensor
 
@@ -36,7 +38,17 @@ class Population:
     @property
     def room(self) -> int:
         """Most hidden neurons that a network of this population can have."""
-        return self.hidden.shape[1]
+        return self.genes.shape[1]
+
+    @property
+    def hidden(self) -> Tensor:
+        """``(P, L, d + 1)``, a view."""
+        return self.genes[..., : -self.bias.shape[1]]
+
+    @property
+    def output(self) -> Tensor:
+        """``(P, k, L)``, a view."""
+        return self.genes[..., -self.bias.shape[1] :].mT
 
     @classmethod
     def random(
@@ -44,18 +56,15 @@ class Population:
     ) -> Population:
         """Networks of those sizes with all weights drawn from -1 to 1, as in the paper's figure 5."""
         count, device = len(sizes), sizes.device
-        hidden, output, bias = (
-            uniform(shape, generator, device, dtype)
-            for shape in ((count, room, inputs + 1), (count, outputs, room), (count, outputs))
-        )
-        return cls(hidden, output, bias, sizes).trimmed()
+        genes = uniform((count, room, inputs + 1 + outputs), generator, device, dtype)
+        return cls(genes, uniform((count, outputs), generator, device, dtype), sizes).trimmed()
 
     @classmethod
     def of(cls, networks: Sequence[Network], room: int, device: torch.device, dtype: torch.dtype) -> Population:
         """Given networks."""
         hidden, output, bias = stacked(networks, room)
         sizes = torch.tensor([network.neurons for network in networks], device=device)
-        return cls(hidden.to(device, dtype), output.to(device, dtype), bias.to(device, dtype), sizes)
+        return cls(torch.cat([hidden, output.mT], dim=2).to(device, dtype), bias.to(device, dtype), sizes)
 
     def has(self) -> Tensor:
         """``(P, L)`` True for the neurons that a network has."""
@@ -63,49 +72,70 @@ class Population:
 
     def trimmed(self) -> Population:
         """Neurons that a network does not have made silent."""
-        return replace(self, output=self.output * self.has()[:, None])
+        output = (self.output * self.has()[:, None]).mT
+        return replace(self, genes=torch.cat([self.hidden, output], dim=2))
 
     def network(self, number: int) -> Network:
         """One of them, without the padding."""
         size = int(self.sizes[number])
         parts = (self.hidden[number, :size], self.output[number, :, :size], self.bias[number])
-        return Network(*(part.double().cpu().numpy() for part in parts))
+        return Network(*(part.double().contiguous().cpu().numpy() for part in parts))
 
     def where(self, chosen: Tensor, other: Population) -> Population:
         """The other's networks where ``chosen`` ``(P,)``, else these."""
         return Population(
-            torch.where(chosen[:, None, None], other.hidden, self.hidden),
-            torch.where(chosen[:, None, None], other.output, self.output),
+            torch.where(chosen[:, None, None], other.genes, self.genes),
             torch.where(chosen[:, None], other.bias, self.bias),
             torch.where(chosen, other.sizes, self.sizes),
         )
 
-    def mean_squared_error(self, x1: Tensor, target: Tensor) -> Tensor:
+    def mean_squared_error(self, x1: Tensor, target: Tensor, threads: int = 1) -> Tensor:
         """``(P,)`` squared miss per sample, averaged over the samples (eq. 15).
 
-        Networks of like size are evaluated together, as many at a time as fit into the fast memory.
+        Networks of like size are evaluated together.
 
         Args:
             x1: ``(d + 1, N)`` inputs as ``network.with_ones`` makes them.
             target: ``(k, N)``.
+            threads: at most so many, on a CPU; the result does not depend on their number.
         """
-        errors = torch.empty(len(self), dtype=target.dtype, device=target.device)
-        samples = target.shape[1]
-        fast = CACHE_BYTES if target.device.type == "cpu" else GPU_BYTES
-        order = torch.argsort(self.sizes)
-        sizes = self.sizes[order].tolist()
-        same = sizes[0] == sizes[-1]
-        start = 0
-        while start < len(self):
-            at_once = max(1, fast // (max(sizes[start], 1) * samples * target.element_size()))
-            end = min(start + at_once, len(self))
-            rows = slice(start, end) if same else order[start:end]
-            neurons = sizes[end - 1]
+        on_cpu = target.device.type == "cpu"
+        squares = self._squares_on_cpu(x1, target, threads) if on_cpu else self._squares_on_gpu(x1, target)
+        return squares / target.shape[1]
+
+    def _squares_on_gpu(self, x1: Tensor, target: Tensor) -> Tensor:
+        squares = torch.empty(len(self), dtype=target.dtype, device=target.device)
+        for rows, neurons in self._groups(GPU_BYTES, target):
             said = activations(self.hidden[rows, :neurons], x1)
             miss = torch.baddbmm(self.bias[rows, :, None], self.output[rows, :, :neurons], said).sub_(target)
-            errors[rows] = torch.linalg.vector_norm(miss.flatten(1), dim=1).square_()
+            squares[rows] = torch.linalg.vector_norm(miss.flatten(1), dim=1).square_()
+        return squares
+
+    def _squares_on_cpu(self, x1: Tensor, target: Tensor, threads: int) -> Tensor:
+        genes, bias, inputs, wanted = (tensor.numpy() for tensor in (self.genes, self.bias, x1, target))
+        squares = torch.empty(len(self), dtype=target.dtype)
+        found = squares.numpy()
+
+        def evaluate(group: tuple[Rows, int]) -> None:
+            chosen, neurons = group
+            rows = chosen if isinstance(chosen, slice) else chosen.numpy()
+            found[rows] = evaluation.squared_misses(genes[rows, :neurons], bias[rows], inputs, wanted)
+
+        evaluation.share_out(evaluate, list(self._groups(CPU_BYTES, target)), threads)
+        return squares
+
+    def _groups(self, fast: int, target: Tensor) -> Iterator[tuple[Rows, int]]:
+        """Networks of like size, and the largest such: as many as leave their activations in so many fast bytes."""
+        sizes, order = self.sizes.tolist(), None
+        if min(sizes) != max(sizes):
+            order = torch.argsort(self.sizes, stable=True)
+            sizes = self.sizes[order].tolist()
+        start = 0
+        while start < len(self):
+            at_once = max(1, fast // (max(sizes[start], 1) * target.shape[1] * target.element_size()))
+            end = min(start + at_once, len(self))
+            yield slice(start, end) if order is None else order[start:end], sizes[end - 1]
             start = end
-        return errors / samples
 
 
 def uniform(shape: tuple[int, ...], generator: torch.Generator, device: torch.device, dtype: torch.dtype) -> Tensor:
