@@ -18,6 +18,32 @@ RobotCheck = Annotated[str | None, typer.Option("--robot", help="refuse a calibr
 Json = Annotated[bool, typer.Option("--json", help="print JSON for machines instead of text")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="file to write", show_default=False)]
 MaxCorrection = Annotated[float, typer.Option("--max-correction-mm", help="refuse to move any target further")]
+ProgramFile = Annotated[
+    Path,
+    typer.Argument(help="URScript program (.script), or toolpath (.csv: joints, or flange poses)", show_default=False),
+]
+Express = Annotated[
+    str | None,
+    typer.Option("--as", help="write corrected targets as joints or as poses; default: as the line held them"),
+]
+ControllerKinematics = Annotated[
+    str,
+    typer.Option(help="by which the controller turns poses into joints: nominal, a calibration.conf, or its .yaml"),
+]
+PathTolerance = Annotated[
+    float | None, typer.Option(min=0, help="add targets on lines and arcs where the tool would leave them further")
+]
+CellSpec = Annotated[
+    str | None,
+    typer.Option(help="look for collisions in this cell (ur5_cell, a .dmd.yaml); none: nowhere; default: the one that "
+                 "was calibrated, if it was a cell"),
+]  # fmt: skip
+StartDeg = Annotated[
+    str | None, typer.Option(help="joints from which the program starts, with commas; for programs of poses only")
+]
+Tcp = Annotated[
+    str | None, typer.Option(help="tool before the program sets one: x,y,z in mm, rx,ry,rz rotation vector in rad")
+]
 PayloadKg = Annotated[
     float | None,
     typer.Option("--payload-kg", min=0, help="on the flange, beyond the model's; default: as in the measurements"),

@@ -7,65 +7,115 @@ from typing import Annotated
 
 import typer
 
-from truepath.cli_options import CalibrationFile, Json, MaxCorrection, Output, PayloadKg, RobotCheck, robot_named
+from truepath.cli_options import (
+    CalibrationFile,
+    CellSpec,
+    ControllerKinematics,
+    Express,
+    Json,
+    MaxCorrection,
+    Output,
+    PathTolerance,
+    PayloadKg,
+    ProgramFile,
+    RobotCheck,
+    StartDeg,
+    Tcp,
+    robot_named,
+)
+from truepath.errors import InputError
 
 
 def correct(
-    path: Annotated[Path, typer.Argument(help="toolpath CSV: joint columns, or flange poses", show_default=False)],
+    path: ProgramFile,
     calibration: CalibrationFile,
-    output: Output,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="file to write", show_default=False)] = None,
     robot: RobotCheck = None,
     payload_kg: PayloadKg = None,
     max_correction_mm: MaxCorrection = 5.0,
+    express: Express = None,
+    controller_kinematics: ControllerKinematics = "nominal",
+    path_tolerance_mm: PathTolerance = 0.05,
+    cell: CellSpec = None,
+    start_deg: StartDeg = None,
+    tcp: Tcp = None,
+    allow_partial: Annotated[
+        bool, typer.Option("--allow-partial", help="exit with 0 though some targets cannot be resolved")
+    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="print the summary, write nothing")] = False,
     json: Json = False,
 ) -> None:
-    """Rewrite a path so that the real robot goes where the program means it to."""
-    from truepath import console
+    """Rewrite a program so that the real robot goes where the program means it to."""
+    from truepath import console, console_programs
     from truepath.calibration import load_calibration
     from truepath.files import write_atomically
-    from truepath.pipeline import correct_toolpath, keep
+    from truepath.pipeline import keep, require_place
+    from truepath.rewriting.rewrite import rewrite_program
+    from truepath.rewriting.stated import stated_options
 
-    keep(output, path, calibration)
-    with console.progress("correcting"):
+    if output is None and not dry_run:
+        raise InputError("nowhere to write to", expected="--output FILE, or --dry-run")
+    if output is not None:
+        keep(output, path, calibration)
+        require_place(output)
+    with console.progress("correcting") as say:
+        say("reading the calibration")
         loaded = load_calibration(calibration, None if robot is None else robot_named(robot)).carrying(payload_kg)
-        corrected = correct_toolpath(path, loaded, max_correction_mm=max_correction_mm)
-        write_atomically(output, corrected.text)
+        options = stated_options(
+            loaded, express, controller_kinematics, path_tolerance_mm, max_correction_mm, cell, start_deg, tcp
+        )
+        rewritten = rewrite_program(path, loaded, options, say=say)
+        if output is not None and not dry_run:
+            write_atomically(output, rewritten.content)
+    written = None if dry_run or output is None else str(output)
     if json:
-        console.print_json({"output": str(output), **corrected.correction.summary()})
-        return
-    console.print_correction(corrected.correction)
-    console.out.print(f"written to {output}")
+        console.print_json({"output": written, **rewritten.summary()})
+    else:
+        console_programs.print_rewritten(rewritten)
+        console.out.print("nothing is written (--dry-run)" if written is None else f"written to {written}")
+    if rewritten.unresolved and not allow_partial:
+        raise typer.Exit(1)
 
 
 def preview(
-    path: Annotated[Path, typer.Argument(help="toolpath CSV as programmed (not yet corrected)", show_default=False)],
+    path: Annotated[Path, typer.Argument(help="program as programmed (not yet corrected)", show_default=False)],
     calibration: CalibrationFile,
     output: Output,
     robot: Annotated[str | None, typer.Option("--robot", help="model to draw; default: the calibration's own")] = None,
     magnification: Annotated[float, typer.Option(help="by how much errors are drawn larger than they are")] = 50.0,
     payload_kg: PayloadKg = None,
     max_correction_mm: MaxCorrection = 5.0,
+    controller_kinematics: ControllerKinematics = "nominal",
+    start_deg: StartDeg = None,
+    tcp: Tcp = None,
 ) -> None:
     """Show a path as programmed, as the real robot would go, and as corrected: one HTML page."""
-    from truepath import console
+    from truepath import console, console_programs
     from truepath.calibration import load_calibration
-    from truepath.pipeline import correct_toolpath, keep
+    from truepath.pipeline import keep
     from truepath.preview import write_preview
+    from truepath.rewriting.rewrite import rewrite_program
+    from truepath.rewriting.stated import stated_options
+    from truepath.rewriting.watch import along_the_program
 
     keep(output, path, calibration)
-    with console.progress("drawing"):
+    with console.progress("drawing") as say:
         loaded = load_calibration(calibration).carrying(payload_kg)
-        corrected = correct_toolpath(path, loaded, max_correction_mm=max_correction_mm)
+        options = stated_options(loaded, None, controller_kinematics, None, max_correction_mm, "none", start_deg, tcp)
+        rewritten = rewrite_program(path, loaded, options, say=say)
+        if not len(rewritten.plan):
+            raise InputError("there is nothing to show", file=path, expected="targets that can be resolved")
+        along = along_the_program(rewritten.plan, rewritten.correction.q_rad, rewritten.ways)
         write_preview(
             output,
             loaded,
-            corrected.q_programmed,
-            corrected.correction.q_rad,
+            along.q_today_rad,
+            along.q_corrected_rad,
             robot_source=robot or loaded.robot.source,
             magnification=magnification,
             title=path.name,
         )
-    console.print_correction(corrected.correction)
+    console_programs.print_rewritten(rewritten)
     console.out.print(f"open {output} in a browser")
 
 

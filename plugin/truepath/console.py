@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from truepath.calibration import Calibration
     from truepath.calibration_parts import AccuracyPart
     from truepath.calibration_residual import ResidualPart
-    from truepath.correct import Correction
     from truepath.diagnosis import Diagnosis
     from truepath.iso9283 import Accuracy
 
@@ -160,24 +159,6 @@ def print_parameters(calibration: Calibration) -> None:
         sigma = "" if p.status == "held" else f"{1e3 * p.sigma:.4f}"
         table.add_row(p.name, f"{1e3 * p.value:.4f}", sigma, unit, "held" if p.status == "held" else "")
     out.print(table)
-
-
-def print_correction(correction: Correction) -> None:
-    """Summary of a corrected path."""
-    before, after = correction.error_before_mm, correction.error_after_mm
-    out.print(
-        f"{len(correction.q_rad)} waypoints corrected by {correction.displacement_mm.mean():.3f} mm on average, "
-        f"{correction.displacement_mm.max():.3f} mm at most"
-    )
-    out.print(
-        f"predicted error of the tool: mean {before.mean():.3f} mm, max {before.max():.3f} mm before; "
-        f"{after.max():.1e} mm after, on top of what the calibration leaves unexplained"
-    )
-    if correction.networks is not None and len(correction.networks.spoken_mm):
-        spread = correction.networks.spoken_mm
-        out.print(f"networks: spread {spread.mean():.3f} mm on average, {spread.max():.3f} mm at most")
-    for warning in correction.warnings:
-        warn(f"warning: {warning}")
 
 
 def _networks(residual: ResidualPart) -> str:

@@ -72,6 +72,7 @@ def correct(
     line: Array | None = None,
     file: str = "path",
     max_correction_mm: float = MAX_CORRECTION_MM,
+    previous: Array | None = None,
 ) -> Correction:
     """Corrects a path given as nominal joints.
 
@@ -82,6 +83,7 @@ def correct(
         line: ``(N,)`` lines of the waypoints in their file, for messages.
         file: name for messages.
         max_correction_mm: no commanded position may move further.
+        previous: ``(N,)`` index of the waypoint before each, -1 where there is none; None: the one in the row before.
 
     Raises:
         CorrectionError: a limit passed, no convergence, a jump against a neighbour, too large a
@@ -117,7 +119,7 @@ def correct(
         line,
         file,
     )
-    _refuse_jumps(q_rad, solution_q, robot.joint_names, line, file)
+    _refuse_jumps(q_rad, solution_q, robot.joint_names, line, file, previous)
     commanded = nominal_flange_poses(robot, solution_q)[:, :3, 3] - nominal_flange_poses(robot, q_rad)[:, :3, 3]
     displacement_mm = 1e3 * np.linalg.norm(commanded, axis=1)
     too_far = ~(displacement_mm <= max_correction_mm)
@@ -181,17 +183,22 @@ def _refuse(beyond: Array, problem: str, q_rad: Array, model: CalibratedModel, l
         )
 
 
-def _refuse_jumps(programmed: Array, corrected: Array, names: tuple[str, ...], line: Array, file: str) -> None:
+def _refuse_jumps(
+    programmed: Array, corrected: Array, names: tuple[str, ...], line: Array, file: str, previous: Array | None
+) -> None:
     """The correction must vary smoothly: what it adds to a step between neighbours is bounded."""
-    added = np.abs(np.diff(corrected - programmed, axis=0))
+    before = np.arange(len(programmed)) - 1 if previous is None else previous
+    at = np.flatnonzero(before >= 0)
+    added = np.abs((corrected - programmed)[at] - (corrected - programmed)[before[at]])
     # Neighbours far apart may differ more: the correction is a smooth function of the joints.
-    allowed = MAX_JUMP_RAD + 0.1 * np.abs(np.diff(programmed, axis=0)).max(axis=1, keepdims=True, initial=0.0)
+    step = np.abs(programmed[at] - programmed[before[at]]).max(axis=1, keepdims=True, initial=0.0)
+    allowed = MAX_JUMP_RAD + 0.1 * step
     if (added > allowed).any():
         k, i = np.argwhere(added > allowed)[0]
         raise CorrectionError(
             "the correction jumps between neighbouring waypoints",
             file=file,
-            line=int(line[k + 1]),
+            line=int(line[at[k]]),
             column=f"q{i + 1} ({names[i]})",
             expected=f"a change of {np.degrees(float(allowed[k, 0])):.2f} deg at most",
             found=f"{np.degrees(added[k, i]):.2f} deg",

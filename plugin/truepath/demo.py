@@ -14,9 +14,10 @@ from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.lie import Array
 from truepath.model import nominal_flange_poses
-from truepath.pipeline import correct_toolpath, write_diagnosis
+from truepath.pipeline import write_diagnosis
 from truepath.preview import write_preview
 from truepath.readers import read_measurements, with_nominal_frames
+from truepath.rewriting.rewrite import rewrite_program
 from truepath.validate import Validation, validate
 from truepath.virtual.hidden_causes import draw_causes, true_poses
 from truepath.virtual.real_robot import RealRobot
@@ -76,13 +77,13 @@ def run_demo(folder: Path, seed: int, say: Callable[[str], None]) -> DemoResult:
 
     say("a welding path is corrected")
     path = plants.models_dir() / "ur5" / "weld_path.csv"
-    corrected = correct_toolpath(path, calibration)
-    write_atomically(folder / "weld_path.corrected.csv", corrected.text)
+    corrected = rewrite_program(path, calibration)
+    write_atomically(folder / "weld_path.corrected.csv", corrected.content)
     assert nominal.X_FR is not None
-    wanted = (nominal.X_WB @ nominal_flange_poses(nominal, corrected.q_programmed) @ nominal.X_FR)[:, :3, 3]
+    wanted = (nominal.X_WB @ nominal_flange_poses(nominal, corrected.plan.q_rad) @ nominal.X_FR)[:, :3, 3]
     before, after = (
         1e3 * np.linalg.norm(true_poses(real, Visits.of(real, q), list(causes.values()))[:, :3, 3] - wanted, axis=1)
-        for q in (corrected.q_programmed, corrected.correction.q_rad)
+        for q in (corrected.plan.q_rad, corrected.correction.q_rad)
     )
 
     say("the preview is drawn")
@@ -90,7 +91,7 @@ def run_demo(folder: Path, seed: int, say: Callable[[str], None]) -> DemoResult:
     write_preview(
         preview,
         calibration,
-        corrected.q_programmed,
+        corrected.plan.q_rad,
         corrected.correction.q_rad,
         robot_source=CELL,
         title="weld_path.csv on the virtual UR5",

@@ -5,21 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from truepath import lie
-from truepath.calibration import Calibration
-from truepath.correct import MAX_CORRECTION_MM, Correction, correct
 from truepath.effects import effect_named
 from truepath.errors import CalibrationError, InputError
 from truepath.files import write_atomically
-from truepath.inverse import joints_along_path
 from truepath.lie import Array
-from truepath.programs.toolpath_csv import Toolpath, read_toolpath
 from truepath.robot import NominalRobot
 from truepath.virtual.simulate import Campaign
 
@@ -28,16 +23,6 @@ if TYPE_CHECKING:
     from truepath.residual.options import Options
 
 RESIDUALS = ("none", "network")
-
-
-@dataclass(frozen=True)
-class CorrectedToolpath:
-    """A toolpath file with its programmed joints ``(N, n)``, their correction, and the text of the new file."""
-
-    toolpath: Toolpath
-    q_programmed: Array
-    correction: Correction
-    text: str
 
 
 @contextmanager
@@ -93,25 +78,6 @@ def networks(
         complain(f"interrupted: the same command goes on from {checkpoint}")
         raise
     desk.remove()
-
-
-def correct_toolpath(
-    path: str | Path, calibration: Calibration, *, max_correction_mm: float = MAX_CORRECTION_MM
-) -> CorrectedToolpath:
-    """Reads a toolpath CSV and corrects it; writes nothing.
-
-    Raises:
-        InputError, CorrectionError: with file and line.
-    """
-    model, region = calibration.model, calibration.region.region()
-    toolpath = read_toolpath(path, model.robot.num_joints)
-    line, file = toolpath.table.lines, str(toolpath.table.file)
-    q = toolpath.q_rad
-    if q is None:
-        assert toolpath.X_BF is not None
-        q = joints_along_path(model.robot, toolpath.X_BF, region, line, file)
-    correction = correct(model, q, region=region, line=line, file=file, max_correction_mm=max_correction_mm)
-    return CorrectedToolpath(toolpath, q, correction, toolpath.with_joints(correction.q_rad))
 
 
 def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path]:

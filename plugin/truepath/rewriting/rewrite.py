@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import date, datetime, timezone
 from pathlib import Path
@@ -109,7 +110,12 @@ class RewrittenProgram:
 
 
 def rewrite_program(
-    path: str | Path, calibration: Calibration, options: RewriteOptions | None = None, *, today: date | None = None
+    path: str | Path,
+    calibration: Calibration,
+    options: RewriteOptions | None = None,
+    *,
+    today: date | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> RewrittenProgram:
     """Corrects a program of any format that truepath reads.
 
@@ -118,6 +124,7 @@ def rewrite_program(
         calibration: of the robot that will run it.
         options: see there.
         today: in UTC, for the age of the calibration and the stamp; default: today.
+        say: is told what is being done.
 
     Raises:
         InputError: no program, corrected already, options that do not fit.
@@ -126,8 +133,9 @@ def rewrite_program(
     options = options or RewriteOptions()
     robot, region = calibration.model.robot, calibration.region.region()
     controller = controller_of(robot, options.controller_kinematics)
+    say("reading the program")
     program = open_program(path, robot, region, controller, options.tool)
-    return rewrite(program, calibration, controller, options, today=today)
+    return rewrite(program, calibration, controller, options, today=today, say=say)
 
 
 def rewrite(
@@ -137,18 +145,22 @@ def rewrite(
     options: RewriteOptions,
     *,
     today: date | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> RewrittenProgram:
     """The same for a program that was read."""
     today = today or datetime.now(timezone.utc).date()
     file, motions, model = program.file, program.motions, calibration.model
     if program.comment is not None:
         refuse_if_stamped(program.text, file, program.comment)
+    say("correcting the targets")
     plan = plan_targets(motions, model.robot, controller, file, options.start_rad)
     correction = _corrected(plan, calibration, options, file)
+    say("looking at what lies between them")
     X_end = controller.tool_poses(correction.q_rad, plan.motions.X_0T)
     ways, findings = sample_ways(plan, model, controller, options.max_correction_mm, file)
     tolerance_mm = options.path_tolerance_mm
     vias = choose_vias(plan, ways, X_end, tolerance_mm, lambda at: program.can_be_added_before(int(plan.index[at])))
+    say("looking for limits and collisions")
     findings = [
         *calibration_findings(calibration, robot_named_in(program.text), today, options.max_age_days),
         *findings,
@@ -156,6 +168,7 @@ def rewrite(
         *watch(plan, correction.q_rad, ways, calibration, options.cell),
     ]
     _refuse(findings, file)
+    say("writing")
     expressed = express(plan, correction.q_rad, ways, vias, controller, options.express)
     before, after = correction.error_before_mm, correction.error_after_mm
     if program.states_tool and len(plan):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from truepath.calibration import Calibration
@@ -76,21 +78,35 @@ def _room(plan: Plan, q_corrected_rad: Array, ways: Ways, calibration: Calibrati
     from truepath.clearance import Cell
     from truepath.closer import clearance_findings, compare
 
-    programmed, corrected, line = _along_the_program(plan, q_corrected_rad, ways)
+    along = along_the_program(plan, q_corrected_rad, ways)
     real = Cell(cell, calibration.model)
-    today, then = real.clearances(programmed), real.clearances(corrected)
+    today, then = real.clearances(along.q_today_rad), real.clearances(along.q_corrected_rad)
     places = compare(today, then)
     if places:  # only then it matters what the drawing says
         from truepath.model import nominal_model
 
         model = calibration.model
         drawn = Cell(cell, nominal_model(model.robot, model.X_MB_nominal, model.X_FE_nominal))
-        places = compare(today, then, drawn.clearances(programmed))
-    return clearance_findings(places, line)
+        places = compare(today, then, drawn.clearances(along.q_today_rad))
+    return clearance_findings(places, along.line)
 
 
-def _along_the_program(plan: Plan, q_corrected_rad: Array, ways: Ways) -> tuple[Array, Array, Array]:
-    """Joints today and corrected ``(K, n)`` with their lines: targets, samples of the ways, and between joint targets."""
+@dataclass(frozen=True, eq=False)
+class AlongTheProgram:
+    """K postures on the way through a program, in the order of its lines.
+
+    Attributes:
+        q_today_rad, q_corrected_rad: ``(K, n)``.
+        line: ``(K,)``.
+    """
+
+    q_today_rad: Array
+    q_corrected_rad: Array
+    line: Array
+
+
+def along_the_program(plan: Plan, q_corrected_rad: Array, ways: Ways) -> AlongTheProgram:
+    """Targets, samples of the ways, and postures between targets of motions of the joints."""
     motions = plan.motions
     order = [motions.line.astype(float)]
     today, corrected, line = [plan.q_today_rad], [q_corrected_rad], [motions.line]
@@ -115,4 +131,4 @@ def _along_the_program(plan: Plan, q_corrected_rad: Array, ways: Ways) -> tuple[
     order.append(motions.line[end][each] - 1 + share)
     # In the order of the program neighbours are near, which the search for collisions profits from.
     sequence = np.argsort(np.concatenate(order), kind="stable")
-    return np.concatenate(today)[sequence], np.concatenate(corrected)[sequence], np.concatenate(line)[sequence]
+    return AlongTheProgram(*(np.concatenate(parts)[sequence] for parts in (today, corrected, line)))

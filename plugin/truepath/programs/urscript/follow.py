@@ -29,6 +29,7 @@ from truepath.programs.urscript.tree import Statement
 from truepath.programs.urscript.values import JointsOf, Pose, Unknown, Value
 
 DEEPEST_CALLS, MOST_STEPS, MOST_ROUNDS = 30, 3_000_000, 30
+ONLY_STATE = (*DEFINES, "assign", "declare")
 
 
 @dataclass(slots=True, eq=False)
@@ -57,7 +58,6 @@ class Follower:
         self._state = State(tool)
         self._frame = Frame((0,), {})
         self._muted = self._depth = self._steps = self._scopes = 0
-        self._called: set[str] = set()
         self._statement: Statement | None = None
         self._volatile = changed_by_threads(program)
         self._run(program)
@@ -65,7 +65,7 @@ class Follower:
     def _run(self, program: list[Statement]) -> None:
         self._define(program)
         self._block(program)
-        if self.moves.by_key or self._called & self._frame.functions.keys():
+        if any(statement.node.op not in ONLY_STATE for statement in program):
             return
         # Nothing is done: the definitions are the programs. Those that others call are not.
         used = called_anywhere(program)
@@ -224,7 +224,6 @@ class Follower:
         name = word(node.args[0], line)
         defined = self._frame.functions.get(name)
         if defined is not None:
-            self._called.add(name)
             return self._enter(*defined, arguments, keywords)
         if name in MOVES:
             return self._move(node, name, arguments, keywords, line)
@@ -239,7 +238,6 @@ class Follower:
     def start_thread(self, name: str) -> None:
         if name not in self._frame.functions:
             return
-        self._called.add(name)
         before, moves = self._state.copy(), len(self.moves.by_key)
         self._state.last = ANYWHERE
         self._enter(*self._frame.functions[name], [], {})
