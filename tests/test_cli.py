@@ -172,7 +172,7 @@ def test_too_few_poses_are_refused_before_anything_is_written(truepath, cell, tm
 
 def test_a_folder_that_does_not_exist_is_no_place_to_write_to(truepath, cell, tmp_path):
     outcome = truepath("correct", WELD_PATH, "-c", cell / "ur5.json", "-o", tmp_path / "nowhere" / "c.csv")
-    assert is_refused(outcome, "cannot write here")
+    assert is_refused(outcome, "the output cannot be written", "nowhere")
     assert truepath("correct", WELD_PATH, "-c", cell / "ur5.json", "-o", tmp_path).code == 2
 
 
@@ -308,12 +308,17 @@ def test_a_waypoint_that_cannot_be_corrected_is_named_and_nothing_is_written(tru
     assert [path.name for path in tmp_path.iterdir()] == ["spoiled.csv"]
 
 
-@pytest.mark.parametrize("bound", ["0.1", "nan", "-1"])
-def test_a_correction_beyond_the_stated_bound_leaves_the_old_output_alone(truepath, cell, tmp_path, bound):
+BEYOND = ("larger than allowed", "weld_path.csv, line 2")
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"), [("0.1", BEYOND), ("0", BEYOND), ("nan", ("is no length",)), ("-1", ("is no length",))]
+)
+def test_a_correction_beyond_the_stated_bound_leaves_the_old_output_alone(truepath, cell, tmp_path, bound, words):
     output = tmp_path / "out.csv"
     output.write_text("old")
     outcome = truepath("correct", WELD_PATH, "-c", cell / "ur5.json", "-o", output, f"--max-correction-mm={bound}")
-    assert is_refused(outcome, "larger than allowed", "weld_path.csv, line 2")
+    assert is_refused(outcome, *words)
     assert output.read_text() == "old"
 
 

@@ -16,9 +16,9 @@ from truepath.export import set_calibrated_frames
 from truepath.inverse import solve
 from truepath.learn import learn
 from truepath.model import nominal_flange_poses, nominal_model
-from truepath.pipeline import correct_toolpath
 from truepath.programs.toolpath_csv import read_toolpath
 from truepath.region import cover
+from truepath.rewriting.rewrite import rewrite_program
 from truepath.virtual.real_robot import RealRobot
 from truepath.virtual.simulate import Campaign, free_poses, measure
 
@@ -107,18 +107,18 @@ def test_with_stated_frames_the_tool_is_within_a_micrometre_of_its_programmed_pl
 
 
 def test_the_joints_in_the_file_still_reach_it_after_rounding(calibration, drake, tmp_path):
-    corrected = correct_toolpath(WELD_PATH, calibration)
-    (tmp_path / "corrected.csv").write_text(corrected.text)
+    corrected = rewrite_program(WELD_PATH, calibration)
+    (tmp_path / "corrected.csv").write_bytes(corrected.content)
     q = read_toolpath(tmp_path / "corrected.csv", 6).q_rad
     model = calibration.model
-    wanted = model.X_MB_nominal @ drake.flange_poses(corrected.q_programmed) @ model.X_FE_nominal
+    wanted = model.X_MB_nominal @ drake.flange_poses(corrected.plan.q_rad) @ model.X_FE_nominal
     reached = model.X_MB @ calibrated_drake(model).flange_poses(q) @ model.X_FE
     assert distances(reached, wanted).max() < MICROMETRE
     assert angles(reached, wanted).max() < MICRORADIAN
 
 
 def test_a_path_of_poses_is_reached_within_a_micrometre_too(calibration, tmp_path):
-    corrected = correct_toolpath(POSE_PATH, calibration)
+    corrected = rewrite_program(POSE_PATH, calibration)
     model, programmed = calibration.model, read_toolpath(POSE_PATH, 6).X_BF
     reached = calibrated_drake(model).flange_poses(corrected.correction.q_rad)
     wanted = np.linalg.inv(model.X_MB) @ model.X_MB_nominal @ programmed @ model.X_FE_nominal
@@ -142,10 +142,10 @@ def test_an_arm_of_seven_joints_is_corrected_within_a_micrometre(seven, seven_jo
 
 
 def test_on_the_real_robot_the_tool_error_falls_from_millimetres_to_the_noise(real, calibration):
-    corrected = correct_toolpath(WELD_PATH, calibration)
+    corrected = rewrite_program(WELD_PATH, calibration)
     nominal = real.robot
-    programmed = nominal.X_WB @ DrakeArm("ur5").flange_poses(corrected.q_programmed) @ nominal.X_FR
-    before = distances(real.reflector_poses(corrected.q_programmed), programmed)
+    programmed = nominal.X_WB @ DrakeArm("ur5").flange_poses(corrected.plan.q_rad) @ nominal.X_FR
+    before = distances(real.reflector_poses(corrected.plan.q_rad), programmed)
     after = distances(real.reflector_poses(corrected.correction.q_rad), programmed)
     assert before.mean() > 1e-3
     assert after.mean() < 2e-5
@@ -153,9 +153,9 @@ def test_on_the_real_robot_the_tool_error_falls_from_millimetres_to_the_noise(re
 
 
 def test_the_error_that_was_predicted_is_the_error_that_drake_finds(real, calibration):
-    corrected = correct_toolpath(WELD_PATH, calibration)
-    programmed = real.robot.X_WB @ DrakeArm("ur5").flange_poses(corrected.q_programmed) @ real.robot.X_FR
-    before_mm = 1e3 * distances(real.reflector_poses(corrected.q_programmed), programmed)
+    corrected = rewrite_program(WELD_PATH, calibration)
+    programmed = real.robot.X_WB @ DrakeArm("ur5").flange_poses(corrected.plan.q_rad) @ real.robot.X_FR
+    before_mm = 1e3 * distances(real.reflector_poses(corrected.plan.q_rad), programmed)
     assert corrected.correction.error_before_mm == pytest.approx(before_mm, abs=0.04)
     assert corrected.correction.error_after_mm.max() < 1e-3
 

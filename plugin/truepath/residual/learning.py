@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from threading import Event
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from truepath.lie import Array
 from truepath.residual.ensemble import NetworkResidual
@@ -75,6 +76,7 @@ def learn_network(lesson: Lesson, options: Options, report: Callable[[State], No
     return trained.network
 
 
+@threadpool_limits.wrap(limits=1)  # else the first one to be done gives the threads back to the others too
 def learn_networks(
     lessons: Sequence[Lesson], options: Options, title: str, progress: Progress = lambda _: None
 ) -> list[Network]:

@@ -63,14 +63,14 @@ class RewrittenProgram:
     def summary(self) -> dict[str, Any]:
         """What a machine wants to know, as plain JSON types."""
         off_before, off_after = self.vias.before_mm, self.vias.after_mm
+        content = self.correction.summary() if len(self.plan) else {"schema": "truepath.correction/1", "waypoints": 0}
         return {
-            "schema": "truepath.rewrite/1",
+            **content,
             "program": self.file,
             "sha256": hashlib.sha256(self.content).hexdigest(),
             "targets": len(self.plan) + len(self.unresolved),
             "corrected": len(self.plan),
             "changed": self.changed,
-            "displacement_mm": _statistics(self.correction.displacement_mm),
             "predicted_error_before_mm": _statistics(self.error_before_mm),
             "predicted_error_after_mm": _statistics(self.error_after_mm),
             "path": {
@@ -80,7 +80,6 @@ class RewrittenProgram:
                 "added": len(self.vias.added),
                 "lines": self._added_by_line(),
             },
-            "outside_calibrated_region": int(self.correction.outside.sum()),
             "unresolved": [vars(each).copy() for each in self.unresolved],
             "cell": self.cell,
             "findings": [finding.to_json() for finding in self.findings],

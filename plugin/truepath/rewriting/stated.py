@@ -38,8 +38,8 @@ def stated_options(
         raise InputError(f"unknown form {express!r}", expected="joints or poses")
     if path_tolerance_mm is not None and not path_tolerance_mm >= 0:
         raise InputError("the path tolerance is no length", expected="0 or more, in mm", found=str(path_tolerance_mm))
-    if not max_correction_mm > 0:
-        raise InputError("the largest correction is no length", expected="more than 0 mm", found=str(max_correction_mm))
+    if not max_correction_mm >= 0:
+        raise InputError("the largest correction is no length", expected="0 mm or more", found=str(max_correction_mm))
     joints = len(calibration.robot.joint_names)
     start = None if start_deg is None else _numbers(start_deg, joints, "--start-deg", f"{joints} angles in degrees")
     tool = None if tcp is None else _numbers(tcp, 6, "--tcp", "x,y,z in mm, rx,ry,rz in rad")
