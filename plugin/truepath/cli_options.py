@@ -31,7 +31,7 @@ ControllerKinematics = Annotated[
     typer.Option(help="by which the controller turns poses into joints: nominal, a calibration.conf, or its .yaml"),
 ]
 PathTolerance = Annotated[
-    float | None, typer.Option(min=0, help="add targets on lines and arcs where the tool would leave them further")
+    float | None, typer.Option(help="add targets on lines and arcs where the tool would leave them further")
 ]
 CellSpec = Annotated[
     str | None,

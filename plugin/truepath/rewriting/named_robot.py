@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 HEAD_LINES = 60
-COMMENTED = re.compile(r"^\s*#(.*)$", re.MULTILINE)
+COMMENTED = re.compile(r"#(.*)$", re.MULTILINE)
 STATED = re.compile(
     r"\b(?:robot|controller|machine|model|type)\b\W{1,4}(?:universal robots?\W+)?(UR\W?\d+e?)\b", re.IGNORECASE
 )
