@@ -102,6 +102,7 @@ class Walk:
     axes: ThreeParallelAxes
     targets: Targets
     candidates: Array  # (8, 6, M)
+    singular: Array  # (8, M) where another posture is as good as this one
 
     def __post_init__(self) -> None:
         count = len(self.targets.parent)
@@ -167,6 +168,8 @@ class Walk:
         targets, count = self.targets, len(self.targets.parent)
         following, added = np.full(count, NONE), np.zeros((6, count))
         straight = targets.follows & targets.is_straight
+        # From where two postures are one a line may go on in either.
+        straight[straight] = ~self.singular[before, targets.parent[straight]]
         for where, choose in ((straight, self._along_lines), (targets.follows & ~straight, self._to_nearest)):
             index = np.flatnonzero(where)
             if len(index):

@@ -1,6 +1,6 @@
 """Newton's method for very many targets of which nearly the right joints are known.
 
-The same as ``inverse.solve`` but for speed: targets come last in every array, which is three times as fast, and there
+The same as ``inverse.solve`` but for speed: targets come last in every array, which is twice as fast, and there
 is no singular value at the end.
 """
 

@@ -21,7 +21,7 @@ from truepath.ur_postures import Candidates, ThreeParallelAxes
 LIMIT_RAD, SAME_RAD = 1e-6, 1e-6
 STEPS_AT_THE_EDGE, SAME_POSTURE_RAD = 12, 0.5
 ANOTHER_RAD = 0.05  # further than an arm is askew: into another posture
-MISSED_BY_RAD = 0.1
+MISSED_BY_RAD, SURELY_NEAREST_RAD = 1.0, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +82,7 @@ def follow_targets(
         q, ambiguous, start_unknown = _follow_in_closed_form(robot, axes, targets)
     reached = ~np.isnan(q[:, 0])
     start_unknown &= targets.is_pose
+    ambiguous &= reached
     certain = _certain(targets, reached, ambiguous)
     count = len(X)
     return FollowedTargets(q[:count], reached[:count], ambiguous[:count], start_unknown[:count], certain[:count])
@@ -91,7 +92,7 @@ def _follow_in_closed_form(robot: NominalRobot, axes: ThreeParallelAxes, targets
     """Joints ``(M, 6)``, NaN where not reached; ties ``(M,)``; where the start is unknown ``(M,)``."""
     count = len(targets.parent)
     candidates, missed = _candidates(robot, axes, targets)
-    walk = Walk(robot, axes, targets, candidates.q_rad)
+    walk = Walk(robot, axes, targets, candidates.q_rad, candidates.singular)
     q = targets.q_rad.copy()
     starts = np.unique(targets.parent[targets.follows])
     starts = starts[~targets.is_pose[starts]]
@@ -128,7 +129,7 @@ class Missed:
 
     Attributes:
         target: ``(L,)``.
-        q_rad: ``(L, 6)`` of the ideal arm.
+        q_rad: ``(L, 6)`` of the ideal arm; NaN where that does not reach either.
     """
 
     target: Array
@@ -143,7 +144,8 @@ class Missed:
             k = order[place]
             away = (self.q_rad - near_rad[k])[:, TELL_POSTURES]
             away -= TURN * np.rint(away / TURN)
-            is_nearer = np.linalg.norm(away, axis=1) < distance_rad[k] + MISSED_BY_RAD
+            is_nearer = ~(np.linalg.norm(away, axis=1) > distance_rad[k] + MISSED_BY_RAD)
+            is_nearer &= distance_rad[k] > SURELY_NEAREST_RAD
             nearer[k[is_nearer & (chosen[k] == self.target)]] = True
         return nearer
 
@@ -156,7 +158,10 @@ def _candidates(robot: NominalRobot, axes: ThreeParallelAxes, targets: Targets) 
     X = targets.X if needed.all() else targets.X[index]
     found = axes.solve(X)
     # Next to a singularity a small difference between the real arm and its ideal is a large one of the joints.
-    posture, at = np.nonzero(found.doubtful & ~np.isnan(found.q_rad[:, 0]))
+    posture, at = np.nonzero(found.doubtful)
+    lost = np.isnan(found.q_rad[posture, 0, at])
+    nowhere = index[at[lost]]
+    posture, at = posture[~lost], at[~lost]
     ideal = found.q_rad[posture, :, at]
     q, good = newton(robot, X[at], ideal, steps=STEPS_AT_THE_EDGE)
     good &= np.abs(q - ideal)[:, TELL_POSTURES].max(axis=1, initial=0.0) < SAME_POSTURE_RAD
@@ -166,7 +171,7 @@ def _candidates(robot: NominalRobot, axes: ThreeParallelAxes, targets: Targets) 
         twin = (away < SAME_RAD) & (posture & other > 0)
         found.q_rad[posture[twin], :, at[twin]] = np.nan
     none = np.isnan(found.q_rad[posture, 0, at])
-    missed = Missed(index[at[none]], ideal[none])
+    missed = Missed(np.append(index[at[none]], nowhere), np.append(ideal[none], np.full((len(nowhere), 6), np.nan), 0))
     return (found if needed.all() else found.spread(index, len(needed))), missed
 
 

@@ -25,7 +25,7 @@ from truepath.robot import NominalRobot
 POSTURES = 8
 PARALLEL_RAD, MEET_M = 0.05, 0.02  # calibrated axes are a little askew
 IDEAL = 1e-10  # rad, m: no more askew than that is rounding
-SLACK = 0.02  # of a cosine about 1, where an askew arm may reach although its ideal does not, or the other way round
+SLACK = 0.05  # of a cosine about 1, where an askew arm may reach although its ideal does not, or the other way round
 MERGED_RAD = 0.01  # two postures this near to each other are hardly two
 FREE, FREE_ASKEW = 1e-4, 5e-3  # sine of the angle between axes 4 and 6 below which q4 and q6 are hardly determined
 CHUNK = 2048  # fits the cache, which is twice as fast
@@ -209,7 +209,7 @@ class ThreeParallelAxes:
             # An askew arm starts a little bent, so that Newton's method finds both postures at an edge.
             most = 1.0 if self.is_ideal else 1 - self.slack / 4
             angle = np.arccos(np.where(size > 1 + self.slack, np.nan, np.clip(cosine, -most, most)))
-        return angle, size > np.cos(MERGED_RAD), size > 1 - self.slack
+        return angle, size > np.cos(MERGED_RAD), np.abs(size - 1) < self.slack
 
 
 def _rodrigues(axis: Array, vectors: Array) -> tuple[Array, Array, Array]:
