@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hand_made_networks import residual_about
-from truepath import console
+from truepath import console_programs
 from truepath.correct import correct
 from truepath.model import nominal_model
 from truepath.networks_along import NetworksAlong
@@ -53,7 +53,7 @@ def about_networks(corrected):
 
 
 def printed(corrected, capsys):
-    console.print_correction(corrected)
+    console_programs.print_networks(corrected)
     return capsys.readouterr().out
 
 

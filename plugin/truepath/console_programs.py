@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from truepath.console import out, warn
 
 if TYPE_CHECKING:
+    from truepath.correct import Correction
     from truepath.rewriting.rewrite import RewrittenProgram
 
 SHOWN = 20
@@ -30,9 +31,7 @@ def print_rewritten(program: RewrittenProgram) -> None:
     else:
         warn("warning: the program has no target that can be corrected")
     _print_path(program)
-    if correction.networks is not None and len(correction.networks.spoken_mm):
-        spread = correction.networks.spoken_mm
-        out.print(f"networks: spread {spread.mean():.3f} mm on average, {spread.max():.3f} mm at most")
+    print_networks(correction)
     if program.cell is not None:
         out.print(f"looked for collisions in {program.cell}")
     for warning in program.warnings:
@@ -45,6 +44,13 @@ def print_rewritten(program: RewrittenProgram) -> None:
             out.print(f"  line {each.line}: {each.text}\n    {each.why}")
         if len(program.unresolved) > SHOWN:
             out.print(f"  ... and {len(program.unresolved) - SHOWN} more (--json lists all)")
+
+
+def print_networks(correction: Correction) -> None:
+    """How far the networks of a calibration differ along a program, if it has any that speak there."""
+    if correction.networks is not None and len(correction.networks.spoken_mm):
+        spread = correction.networks.spoken_mm
+        out.print(f"networks: spread {spread.mean():.3f} mm on average, {spread.max():.3f} mm at most")
 
 
 def _print_path(program: RewrittenProgram) -> None:

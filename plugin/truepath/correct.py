@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from truepath import inverse
 from truepath.errors import CorrectionError, InputError
 from truepath.iso9283 import ErrorStatistics
+from truepath.kinematics.corrected_joints import CorrectedJoints, corrected_joints
 from truepath.lie import Array
-from truepath.model import CalibratedModel, nominal_flange_poses
+from truepath.model import CalibratedModel
 from truepath.networks_along import NetworksAlong
 from truepath.region import Region
 
@@ -21,7 +21,6 @@ MAX_JUMP_RAD = 0.02
 LIMIT_ROUNDING_RAD = 1e-9  # a limit written with few decimals is still that limit
 NEAR_SINGULAR = 0.03
 WEIGHT_DIGITS = 6
-CHUNK = 20_000
 FORWARD_TOLERANCE_M, FORWARD_TOLERANCE_RAD = 1e-6, 1e-6
 
 
@@ -109,8 +108,8 @@ def correct(
         line,
         file,
     )
-    parts = [_solve_chunk(model, q_rad[k : k + CHUNK], line[k : k + CHUNK], file) for k in range(0, len(q_rad), CHUNK)]
-    solution_q, singular, before, after = (np.concatenate(part) for part in zip(*parts, strict=True))
+    solution = _solve(model, q_rad, line, file)
+    solution_q, displacement_mm = solution.q_rad, solution.displacement_mm
     _refuse(
         (solution_q < lower) | (solution_q > upper),
         "the corrected joint passes its limit",
@@ -120,8 +119,6 @@ def correct(
         file,
     )
     _refuse_jumps(q_rad, solution_q, robot.joint_names, line, file, previous)
-    commanded = nominal_flange_poses(robot, solution_q)[:, :3, 3] - nominal_flange_poses(robot, q_rad)[:, :3, 3]
-    displacement_mm = 1e3 * np.linalg.norm(commanded, axis=1)
     too_far = ~(displacement_mm <= max_correction_mm)
     if too_far.any():
         k = int(np.argmax(too_far))
@@ -137,21 +134,20 @@ def correct(
     return Correction(
         q_rad=solution_q,
         displacement_mm=displacement_mm,
-        error_before_mm=before,
-        error_after_mm=after,
+        error_before_mm=solution.error_before_mm,
+        error_after_mm=solution.error_after_mm,
         outside=outside,
         networks=networks,
-        warnings=_warnings(outside, networks, singular, line),
+        warnings=_warnings(outside, networks, solution.smallest_singular_value, line),
     )
 
 
-def _solve_chunk(model: CalibratedModel, q_rad: Array, line: Array, file: str) -> tuple[Array, Array, Array, Array]:
-    """Corrected joints, smallest singular values and the tool error in mm before and after, for some waypoints."""
-    goal = model.goal_flange_poses(nominal_flange_poses(model.robot, q_rad))
-    solution = inverse.solve(model.flange_poses_and_jacobian, goal, q_rad)
+def _solve(model: CalibratedModel, q_rad: Array, line: Array, file: str) -> CorrectedJoints:
+    solution = corrected_joints(model, q_rad, exact_below=NEAR_SINGULAR)
     ok = (solution.position_error_m < FORWARD_TOLERANCE_M) & (solution.angle_error_rad < FORWARD_TOLERANCE_RAD)
-    change = np.abs(solution.q_rad - q_rad).max(axis=1)
-    if not (ok & (change < MAX_JOINT_CORRECTION_RAD)).all():
+    changes = np.abs(solution.q_rad - q_rad)
+    if not (ok.all() and (changes < MAX_JOINT_CORRECTION_RAD).all()):
+        change = changes.max(axis=1)
         k = int(np.argmin(ok & (change < MAX_JOINT_CORRECTION_RAD)))
         raise CorrectionError(
             "no correction was found near the programmed joints" if not ok[k] else "the correction leaves the posture",
@@ -161,12 +157,7 @@ def _solve_chunk(model: CalibratedModel, q_rad: Array, line: Array, file: str) -
             found=f"{1e6 * solution.position_error_m[k]:.3g} um, {1e6 * solution.angle_error_rad[k]:.3g} urad, "
             f"{np.degrees(change[k]):.2f} deg; distance to singularity {solution.smallest_singular_value[k]:.3g}",
         )
-    wanted = (goal @ model.X_FE)[:, :3, 3]
-    before, after = (
-        1e3 * np.linalg.norm((model.flange_poses(q) @ model.X_FE)[:, :3, 3] - wanted, axis=1)
-        for q in (q_rad, solution.q_rad)
-    )
-    return solution.q_rad, solution.smallest_singular_value, before, after
+    return solution
 
 
 def _refuse(beyond: Array, problem: str, q_rad: Array, model: CalibratedModel, line: Array, file: str) -> None:

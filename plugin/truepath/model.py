@@ -150,10 +150,15 @@ class CalibratedModel:
         Args, Returns:
             ``(N, 4, 4)``.
         """
+        X_BB, X_FF = self.goal_frames()
+        return X_BB @ X_BF_programmed @ X_FF
+
+    def goal_frames(self) -> tuple[Array, Array]:
+        """``(4, 4)`` each, what ``goal_flange_poses`` multiplies a programmed flange pose with, left and right."""
         X_MB, X_FE = self.frames_now()
         X_BB = lie.invert(X_MB) @ self.X_MB_nominal if self.base_is_given else np.eye(4)
         X_FF = self.X_FE_nominal @ lie.invert(X_FE) if self.tool_is_given else np.eye(4)
-        return X_BB @ X_BF_programmed @ X_FF
+        return X_BB, X_FF
 
 
 def _moved_in_place(X_FE: Array, step: Array) -> Array:

@@ -158,19 +158,35 @@ def basis(effect: Effect, term: Term, robot: NominalRobot, context: Context) -> 
     if term.moves is Moves.BASE and any(getattr(context, name, 0) is None for name in term.inputs):
         return np.zeros((len(context), len(COMPONENTS[term.moves]), len(term.parameters)))  # its mean over the campaign
     inputs = readings(robot, context, term.inputs, term.joint, dict(term.constants))
-    names = tuple(name for name, _ in term.constants if not name.startswith("default "))
+    names = constant_names(term)
     values = [np.array([[term.constant(name)]]) for name in names]
-    function = basis_function(effect, replace(term, constants=tuple((name, 0.0) for name in names)))
+    function = pose_function(effect, term)
     if not inputs:
         inputs = [np.zeros(len(context))]
     common = tuple(range(len(inputs), len(inputs) + len(values)))
     (jacobian,) = BatchedFunction(function, [*inputs, *values], common)()
     out = np.swapaxes(jacobian, 1, 2).copy()
-    if "lower_rad" in names:
+    limits = fading_limits(term)
+    if limits is not None:
         assert term.joint is not None
-        theta = context.q_rad[:, term.joint - 1]
-        out *= fade(theta, term.constant("lower_rad"), term.constant("upper_rad"))[:, None, None]
+        out *= fade(context.q_rad[:, term.joint - 1], *limits)[:, None, None]
     return out
+
+
+def constant_names(term: Term) -> tuple[str, ...]:
+    """Of the constants that the motion depends on."""
+    return tuple(name for name, _ in term.constants if not name.startswith("default "))
+
+
+def fading_limits(term: Term) -> tuple[float, float] | None:
+    """Angles of its joint, rad, beyond which a term fades to nothing; None if it never does."""
+    constants = dict(term.constants)
+    return (constants["lower_rad"], constants["upper_rad"]) if "lower_rad" in constants else None
+
+
+def pose_function(effect: Effect, term: Term) -> ca.Function:
+    """``basis_function`` of a term; terms that differ in the values of their constants only have it in common."""
+    return basis_function(effect, replace(term, constants=tuple((name, 0.0) for name in constant_names(term))))
 
 
 @lru_cache(maxsize=1024)
