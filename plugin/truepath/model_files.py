@@ -27,7 +27,7 @@ def find_urdf(source: str | Path, joint_names: tuple[str, ...], robot_name: str)
         InputError: no such file, or no model with these joints in it.
     """
     path = plants.resolve(source)
-    candidates = [(robot_name, path)] if path.suffix == ".urdf" else list(_models(path))
+    candidates = [(robot_name, path)] if path.suffix == ".urdf" else list(models_of(path))
     arms = [(name, urdf) for name, urdf in candidates if set(joint_names) <= _joints(urdf)]
     if not arms:
         raise InputError(
@@ -47,7 +47,7 @@ def mesh_file(uri: str, urdf: Path) -> Path | None:
     return path if path.is_file() else None
 
 
-def _models(directives: Path, depth: int = 0) -> Iterator[tuple[str, Path]]:
+def models_of(directives: Path, depth: int = 0) -> Iterator[tuple[str, Path]]:
     """Names and files of the URDF models that directives add, also those of directives that they add."""
     if depth > MAX_NESTING:
         raise InputError("these directives include themselves", file=directives)
@@ -65,7 +65,7 @@ def _models(directives: Path, depth: int = 0) -> Iterator[tuple[str, Path]]:
                 "the directives name a file that is not there", file=directives, found=str(body.get("file"))
             )
         if kind == "add_directives":
-            yield from _models(path, depth + 1)
+            yield from models_of(path, depth + 1)
         elif path.suffix == ".urdf":
             yield str(body.get("name", "")), path
 
