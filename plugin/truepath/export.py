@@ -58,10 +58,8 @@ def set_calibrated_frames(
     Raises:
         InputError: the arm in the plant is not the calibrated one, or a frame cannot be moved.
     """
-    from pydrake.math import RigidTransform
-
     from truepath.arm import locate_arm
-    from truepath.robot import describe_arm, zero_context
+    from truepath.robot import describe_arm
 
     arm = locate_arm(plant, model_instance=model_instance, flange_frame=flange_frame)
     robot = describe_arm(plant, arm)
@@ -71,11 +69,28 @@ def set_calibrated_frames(
             expected=f"{model.robot.name}, nominal model {model.robot.model_sha256[:12]}",
             found=f"{robot.name}, nominal model {robot.model_sha256[:12]}",
         )
-    frames = [_movable(joint.frame_on_parent()) for joint in arm.joints] + [_movable(_flange_mount(plant, arm))]
-    zero, X_BW = zero_context(plant, arm), lie.invert(robot.X_WB)
+    move_arm_frames(model, plant, arm, context)
+
+
+def move_arm_frames(
+    model: CalibratedModel, plant: MultibodyPlant, arm: Arm, context: Context, *, X_BB: Array | None = None
+) -> None:
+    """The same for an arm that was found already and is the calibrated robot.
+
+    Args:
+        X_BB: ``(4, 4)`` where the base stands, seen from where its body stands in the plant, which itself is not
+            moved: the whole arm beyond it is. None: there.
+    """
+    from pydrake.math import RigidTransform
+
+    from truepath.robot import zero_context
+
+    X_BB = np.eye(4) if X_BB is None else X_BB
+    zero = zero_context(plant, arm)
+    X_BW = lie.invert(arm.base.CalcPoseInWorld(zero).GetAsMatrix4())
     # All of a link moves with its axis; in the link's own coordinates only the difference of two motions remains.
     motion_of_body = np.eye(4)
-    for frame, motion in zip(frames, [*joint_motions(model), np.eye(4)], strict=True):
+    for frame, motion in zip(arm_frames(plant, arm), [*(X_BB @ joint_motions(model)), X_BB], strict=True):
         X_BBody = X_BW @ frame.body().body_frame().CalcPoseInWorld(zero).GetAsMatrix4()
         X_BodyF = frame.CalcPoseInBodyFrame(zero).GetAsMatrix4()
         X_PF = frame.GetPoseInParentFrame(zero).GetAsMatrix4()
@@ -84,6 +99,15 @@ def set_calibrated_frames(
         X_PF_moved[:3, :3] = lie.nearest_rotation(X_PF_moved[:3, :3])
         frame.SetPoseInParentFrame(context, RigidTransform(X_PF_moved))
         motion_of_body = motion
+
+
+def arm_frames(plant: MultibodyPlant, arm: Arm) -> list[FixedOffsetFrame]:
+    """The n + 1 frames that a calibration moves: of the joints, and that by which the flange hangs on the last link.
+
+    Raises:
+        InputError: one of them cannot be moved in a context.
+    """
+    return [_movable(joint.frame_on_parent()) for joint in arm.joints] + [_movable(_flange_mount(plant, arm))]
 
 
 def _flange_mount(plant: MultibodyPlant, arm: Arm) -> Any:
