@@ -35,7 +35,7 @@ def print_rewritten(program: RewrittenProgram) -> None:
     if program.cell is not None:
         out.print(f"looked for collisions in {program.cell}")
     for warning in program.warnings:
-        warn(warning)
+        warn(warning if warning.startswith("warning: ") else f"warning: {warning}")
     if program.unresolved:
         warn(
             f"left as they are, because they cannot be resolved without running the program: {len(program.unresolved)}"

@@ -9,7 +9,7 @@ import numpy as np
 from truepath.guards import Finding
 from truepath.lie import Array
 from truepath.programs.motions import Kind
-from truepath.rewriting.plan import Plan
+from truepath.rewriting.plan import Plan, with_tool_of
 
 FLAT = 1e-6  # sine of the angle between two chords, below which three points are on a line
 
@@ -90,7 +90,8 @@ def arcs_of(plan: Plan, X_CT: Array) -> tuple[dict[int, Arc], list[Finding]]:
         if through < 0 or motions.kind[through] != Kind.THROUGH or motions.previous[through] < 0:
             continue
         start = int(motions.previous[through])
-        one, two, three = X_CT[[start, through, end], :3, 3]
+        begin = with_tool_of(motions, X_CT, np.array([start]), np.array([end]))
+        one, two, three = begin[0, :3, 3], X_CT[through, :3, 3], X_CT[end, :3, 3]
         arc = arc_through(one, two, three, start, through)
         if arc is None:
             message = "its start, middle and end are on a line: no arc, nothing was added on the way"

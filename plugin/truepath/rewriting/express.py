@@ -15,7 +15,7 @@ from truepath.rewriting.plan import Plan
 from truepath.rewriting.vias import Vias
 from truepath.rewriting.ways import Ways
 
-UNCHANGED_RAD = 1e-9  # a target that moves by less stays as it is written
+UNCHANGED_RAD = 2e-8  # a target that moves by less, some hundredths of a micrometre, stays as it is written
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +48,12 @@ def express(
     X_CT = controller.tool_poses(q, motions.X_0T)
     for index, sample in vias.through.items():
         q[index], X_CT[index], changed[index] = ways.q_corrected_rad[sample], ways.X_CT_commanded[sample], True
-    values = np.where(is_pose[:, None], vectors_from_poses(X_CT), q)
+    poses = _turned_alike(vectors_from_poses(X_CT), motions.X_CT)
+    # An arm may have more joints than a pose has numbers; then all targets are of one form.
+    values = q if not is_pose.any() else poses if is_pose.all() else np.where(is_pose[:, None], poses, q)
     kept = np.flatnonzero(changed)
     targets = NewTargets(plan.index[kept], values[kept], is_pose[kept], q[kept])
-    vectors = vectors_from_poses(ways.X_CT_commanded)
+    vectors = _turned_alike(vectors_from_poses(ways.X_CT_commanded), ways.X_CT)
     written = []
     for via in vias.added:
         pose = bool(is_pose[via.target])
@@ -59,6 +61,21 @@ def express(
         numbers = tuple(tuple(source[sample].tolist()) for sample in via.samples)
         written.append(WrittenVia(_first_site(plan, via.target, len(numbers)), numbers, pose, via.blend_m, via.share))
     return Expressed(targets, written)
+
+
+def _turned_alike(vectors: Array, X_meant: Array) -> Array:
+    """Pose vectors ``(N, 6)`` whose rotation vector is, of the two that mean the same, the one nearer to that meant.
+
+    Near half a turn the two point to opposite sides; a reader shall not wonder why the tool turned over.
+    """
+    turn = vectors[:, 3:]
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    other = np.divide(turn * (angle - 2 * np.pi), angle, out=turn.copy(), where=angle > 0)
+    meant = np.nan_to_num(
+        vectors_from_poses(np.nan_to_num(X_meant, nan=0.0) + np.where(np.isnan(X_meant), np.eye(4), 0))
+    )
+    nearer = np.linalg.norm(other - meant[:, 3:], axis=1) < np.linalg.norm(turn - meant[:, 3:], axis=1)
+    return np.where(nearer[:, None], np.hstack([vectors[:, :3], other]), vectors)
 
 
 def _first_site(plan: Plan, target: int, targets_of_the_move: int) -> int:

@@ -59,6 +59,25 @@ def tool_of(X_BF: Array, X_0T: Array, controller: Controller) -> Array:
     return lie.invert(controller.X_BC) @ X_BF @ controller.X_F0 @ X_0T
 
 
+def tool_poses_meant(plan: Plan, controller: Controller) -> Array:
+    """``(N, 4, 4)`` X_CT that the program means, whether it states poses or joints."""
+    motions = plan.motions
+    return np.where(motions.is_pose[:, None, None], motions.X_CT, tool_of(plan.X_BF, motions.X_0T, controller))
+
+
+def with_tool_of(motions: Motions, X_CT: Array, start: Array, target: Array) -> Array:
+    """``(W, 4, 4)`` where the tool that is in force at targets ``(W,)`` is while the robot is at others ``(W,)``.
+
+    Args:
+        X_CT: ``(N, 4, 4)`` of the tool in force at each target.
+    """
+    X = X_CT[start]
+    changed = np.flatnonzero(motions.tool[start] != motions.tool[target])
+    before, then = motions.X_0T[start[changed]], motions.X_0T[target[changed]]
+    X[changed] = X[changed] @ lie.invert(before) @ then
+    return X
+
+
 def plan_targets(
     motions: Motions, robot: NominalRobot, controller: Controller, file: str, start_rad: tuple[float, ...] | None
 ) -> Plan:

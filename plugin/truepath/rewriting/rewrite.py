@@ -163,7 +163,7 @@ def rewrite(
     findings = [
         *calibration_findings(calibration, robot_named_in(program.text), today, options.max_age_days),
         *findings,
-        *_too_far_off(plan, ways, vias, tolerance_mm),
+        *_too_far_off(plan, ways, vias, tolerance_mm, program),
         *watch(plan, correction.q_rad, ways, calibration, options.cell),
     ]
     _refuse(findings, file)
@@ -219,22 +219,18 @@ def _corrected(plan: Plan, calibration: Calibration, options: RewriteOptions, fi
     )
 
 
-def _too_far_off(plan: Plan, ways: Ways, vias: Vias, tolerance_mm: float | None) -> list[Finding]:
+def _too_far_off(plan: Plan, ways: Ways, vias: Vias, tolerance_mm: float | None, program: Program) -> list[Finding]:
     if tolerance_mm is None:
         return []
-    off = np.flatnonzero(vias.after_mm > tolerance_mm)
-    return [
-        Finding(
-            "warning",
-            "path",
-            int(plan.motions.line[ways.target[way]]),
-            "the tool leaves the path on the way to this target, and no line can be added before it",
-            float(vias.after_mm[way]),
-            tolerance_mm,
-            "mm",
-        )
-        for way in off
-    ]
+    findings = []
+    for way in np.flatnonzero(vias.after_mm > tolerance_mm).tolist():
+        target = int(ways.target[way])
+        possible = program.can_be_added_before(int(plan.index[target]))
+        why = "blends leave no room for more targets" if possible else "no line can be added before it"
+        message = f"on the way to this target the tool leaves the path by {vias.after_mm[way]:.3f} mm, and {why}"
+        line, off = int(plan.motions.line[target]), float(vias.after_mm[way])
+        findings.append(Finding("warning", "path", line, message, off, tolerance_mm, "mm"))
+    return findings
 
 
 def _refuse(findings: list[Finding], file: str) -> None:

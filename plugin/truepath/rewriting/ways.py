@@ -16,13 +16,16 @@ from truepath.correct import correct
 from truepath.guards import Finding
 from truepath.lie import Array
 from truepath.model import CalibratedModel, nominal_model
+from truepath.posture_polish import newton
 from truepath.rewriting.arcs import Arc, arcs_of
-from truepath.rewriting.plan import Plan, flange_of, tool_of
+from truepath.rewriting.plan import Plan, flange_of, tool_poses_meant, with_tool_of
+from truepath.robot import NominalRobot
 
 # The correction of a real robot bends by 1e-4 per mm at most (gear waves of 0.05 mm over 100 mm): 0.005 mm in 20 mm.
 SPACING_M, SHORT_M = 0.020, 0.005
 ARC_STEPS = 48  # divisible by twice 1, 2, 3, 4, 6, 8, 12
 MOST_SAMPLES = 512
+STEPS_AT_ONCE = 3  # of Newton's method, for all samples; few need more
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,19 +72,41 @@ def sample_ways(
         CorrectionError: a point on the way whose correction passes a limit; with the line of the target.
     """
     motions = plan.motions
-    X_CT = np.where(motions.is_pose[:, None, None], motions.X_CT, tool_of(plan.X_BF, motions.X_0T, controller))
-    arcs, findings = arcs_of(plan, X_CT)
+    arcs, findings = arcs_of(plan, tool_poses_meant(plan, controller))
     straight = np.flatnonzero(motions.is_straight & (motions.previous >= 0))
     target = np.concatenate([straight, np.array(list(arcs), int)])
     start = np.concatenate([motions.previous[straight], np.array([arc.start for arc in arcs.values()], int)])
     order = np.argsort(target, kind="stable")
     target, start = target[order], start[order]
     by_way = {way: arcs[int(at)] for way, at in enumerate(target.tolist()) if at in arcs}
+    ways = sampled(plan, start, target, by_way, model, controller, max_correction_mm, file)
+    findings += [
+        Finding("warning", "path", int(motions.line[at]), "the nominal robot cannot follow the way to this target: a "
+                "singularity or a joint limit lies on it; nothing was added there")
+        for at in target[~ways.followed]
+    ]  # fmt: skip
+    return ways, findings
 
-    X_start = X_CT[start]
+
+def sampled(
+    plan: Plan,
+    start: Array,
+    target: Array,
+    by_way: dict[int, Arc],
+    model: CalibratedModel,
+    controller: Controller,
+    max_correction_mm: float,
+    file: str,
+) -> Ways:
+    """The ways between targets ``(W,)`` and others ``(W,)``: lines, but for those that are arcs.
+
+    Raises:
+        CorrectionError: see ``sample_ways``.
+    """
+    motions = plan.motions
+    X_CT = tool_poses_meant(plan, controller)
     # With another tool in force than before, the line begins where the new tool is.
-    changed = motions.tool[start] != motions.tool[target]
-    X_start[changed] = tool_of(plan.X_BF[start[changed]], motions.X_0T[target[changed]], controller)
+    X_start = with_tool_of(motions, X_CT, start, target)
     turn = lie.rotation_vector(lie.invert(X_start)[:, :3, :3] @ X_CT[target][:, :3, :3])
     turn_rad = np.linalg.norm(turn, axis=1)
     shift = X_CT[target][:, :3, 3] - X_start[:, :3, 3]
@@ -102,11 +127,10 @@ def sample_ways(
         X[part, :3, 3] = arc.points(share[part])
     X_0T = motions.X_0T[target][way]
     guess = plan.q_rad[start][way] + share[:, None] * (plan.q_rad[target] - plan.q_rad[start])[way]
-    forward = nominal_model(model.robot).flange_poses_and_jacobian
-    solution = inverse.solve(forward, flange_of(X, X_0T, controller), guess)
-    followed = _followed(solution.q_rad, solution.converged, way, len(target), plan, start, target)
+    q, reached = _nominal_joints(model.robot, flange_of(X, X_0T, controller), guess)
+    followed = _followed(q, reached, way, len(target), plan, start, target)
     usable = followed[way]
-    q = np.where(usable[:, None], solution.q_rad, guess)
+    q = np.where(usable[:, None], q, guess)
     corrected, commanded = q.copy(), X.copy()
     if usable.any():
         line = motions.line[target][way][usable]
@@ -115,12 +139,17 @@ def sample_ways(
             model, q[usable], line=line, file=file, max_correction_mm=max_correction_mm, previous=neighbour
         ).q_rad
         commanded[usable] = controller.tool_poses(corrected[usable], X_0T[usable])
-    findings += [
-        Finding("warning", "path", int(motions.line[at]), "the nominal robot cannot follow the way to this target: a "
-                "singularity or a joint limit lies on it; nothing was added there")
-        for at in target[~followed]
-    ]  # fmt: skip
-    return Ways(target, start, length, turn_rad, by_way, first, share, X, q, corrected, commanded, followed), findings
+    return Ways(target, start, length, turn_rad, by_way, first, share, X, q, corrected, commanded, followed)
+
+
+def _nominal_joints(robot: NominalRobot, X_BF: Array, guess: Array) -> tuple[Array, Array]:
+    """Joints ``(S, n)`` near a guess that reach poses ``(S, 4, 4)``, and where they do ``(S,)``."""
+    q, reached = newton(robot, X_BF, guess, steps=STEPS_AT_ONCE)
+    rest = np.flatnonzero(~reached)
+    if len(rest):
+        solution = inverse.solve(nominal_model(robot).flange_poses_and_jacobian, X_BF[rest], q[rest])
+        q[rest], reached[rest] = solution.q_rad, solution.converged
+    return q, reached
 
 
 def _counts(length_m: Array) -> Array:
