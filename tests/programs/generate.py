@@ -48,7 +48,7 @@ class Generated:
     Attributes:
         text: the program, with its own line ends and perhaps a byte-order mark; ``data`` is the same in bytes.
         targets: in file order; ``line``, ``kind``, ``pose`` or ``joints``, ``near``, ``tool``, ``speed``,
-            ``acceleration``, ``time_s``, ``blend_m`` as in the corpus.
+            ``acceleration``, ``time_s``, ``blend_m``, ``moved_by`` as in the corpus.
         unresolved_lines: lines of targets that runs of the program do not agree on.
         not_run_lines: lines of targets in functions that nobody calls.
     """
@@ -70,6 +70,7 @@ class _Function:
     parameter: tuple | None  # text and value that a call must pass; None for a function without parameters
     varied: bool = False  # called with different targets
     calls: int = 0
+    moved_by: dict | None = None  # of one that is nothing but a move to its target: what each target is besides
 
 
 def _matrix(pose):
@@ -385,11 +386,40 @@ class _Writer:
         if function.tool != self.tool:
             self.put(f"set_tcp({self.tool_text(function.tool)})")
             self.tool = list(function.tool)
-        if function.varied:
+        if function.moved_by is not None:
+            self.targets.append(self.wrapped(function))
+        elif function.varied:
             self.put(f"{function.name}({self.literal_pose()[0]})")
         else:
             self.put(f"{function.name}({'' if function.parameter is None else function.parameter[0]})")
         function.calls += 1
+
+    def wrapped(self, function):
+        """A call with a literal, or with a variable that holds one: the target is where the literal is."""
+        (text, pose), name = self.literal_pose(), None
+        if self.rng.random() < 0.3:
+            name = self.fresh("w")
+            line = self.put(f"{name}{self.equals}{text}")
+        called = self.put(f"{function.name}({name or text})")
+        return {"line": line if name else called, "pose": pose, "tool": list(function.tool), **function.moved_by}
+
+    def wrapper(self):
+        """Defines a function that moves to whatever target it is given, and does nothing else with it."""
+        rng, function = self.rng, _Function(self.fresh("weld"), self.new_tool(), None, varied=True)
+        target = self.fresh("seam")
+        kind, name = rng.choice((("linear", "movel"), ("process", "movep"), ("joint", "movej")))
+        stated = {"acceleration": round(rng.uniform(0.2, 1.4), 3), "speed": round(rng.uniform(0.01, 1.0), 4)}
+        self.put(f"def {function.name}({target}):")
+        self.put(f"{self.indent}set_digital_out(2, True)")
+        goal = target
+        if rng.random() < 0.3:
+            goal = self.fresh("goal")
+            self.put(f"{self.indent}local {goal}{self.equals}{target}")
+        settings = f"a={stated['acceleration']}{self.comma}v={stated['speed']}"
+        line = self.put(f"{self.indent}{name}({goal}{self.comma}{settings})")
+        self.put("end")
+        function.moved_by = {"kind": kind, "moved_by": line, **stated}
+        self.functions.append(function)
 
     def statement(self):
         self.budget -= 1
@@ -443,6 +473,8 @@ class _Writer:
             self.values[target] = None if function.varied else function.parameter[1]
             self.kinds[target] = "pose"
         self.put(f"def {function.name}({target if function.parameter else ''}):")
+        if function.varied:  # whoever looks into its target means it as it is: no literal may be changed
+            self.put(f"{self.indent}{self.fresh('z')}{self.equals}{target}[2]")
         inner = None
         if not nested and rng.random() < 0.4:
             self.level += 1
@@ -500,6 +532,8 @@ class _Writer:
                 make()
         for _ in range(rng.randint(0, 3)):
             self.function()
+        if rng.random() < 0.4:
+            self.wrapper()
         self.set_tool()
         while self.budget > 0:
             self.statement()

@@ -129,3 +129,132 @@ def mutate(text, rng):
         if data:
             data = rng.choice(SMALL)(data, rng)
     return rng.choice(LARGE)(data, rng) if rng.random() < 1 / 40 else data
+
+
+def _scaled_number(data, rng):
+    found = [match for match in NUMBER.finditer(data) if b"." in match[0]]
+    if not found:
+        return data
+    number = rng.choice(found)
+    factor = rng.choice((-1.0, 0.0, 1.0001, 1.01, 3.0, 57.3, 1000.0))
+    return data[: number.start()] + b"%.9f" % (factor * float(number[0])) + data[number.end() :]
+
+
+def _plain_line(data, rng):
+    """A line that opens or closes no block, once more, elsewhere, or not at all."""
+    lines = data.split(b"\n")
+    plain = [i for i, line in enumerate(lines) if not re.search(rb"\b(def|thread|sec|if|elif|else|while|end)\b", line)]
+    if not plain:
+        return data
+    at = rng.choice(plain)
+    line = lines.pop(at) if rng.random() < 0.7 else lines[at]
+    if rng.random() < 0.7:
+        lines.insert(rng.randint(0, len(lines)), line)
+    return b"\n".join(lines)
+
+
+GENTLE = (_scaled_number, _scaled_number, _plain_line)
+
+
+def mutate_gently(data, rng):
+    """Other numbers, and lines gone or elsewhere: most of these can still be read."""
+    for _ in range(rng.randint(1, 6)):
+        data = rng.choice(GENTLE)(data, rng)
+    return data
+
+
+# Tables: toolpaths as CSV
+
+ODD_CELLS = (
+    *(
+        b"",
+        b" ",
+        b"nan",
+        b"inf",
+        b"-1e999",
+        b"1e308",
+        b"9" * 400,
+        b"1_000",
+        b"0x1F",
+        b"1,5",
+        b"1;5",
+        b"--1",
+        b"1e",
+        b"x",
+    ),
+    *(b'"', b'"1"', b'"1\n2"', b"1\t", "٣".encode(), "\u22121".encode(), b"x", b"=1+1", b"#", b"\x00", b"\xff", b"360"),
+)
+ODD_NAMES = (
+    b"q1_rad",
+    b"q1_deg",
+    b"q7_rad",
+    b"Q1_rad",
+    b"x_mm",
+    b"x_m",
+    b"qw",
+    b"",
+    b"label",
+    b'"a,b"',
+    "größe".encode(),
+)
+
+
+def _odd_cell(data, rng):
+    lines = data.split(b"\n")
+    at = rng.randrange(len(lines))
+    cells = lines[at].split(b",")
+    cells[rng.randrange(len(cells))] = rng.choice(ODD_NAMES if at == 0 else ODD_CELLS)
+    lines[at] = b",".join(cells)
+    return b"\n".join(lines)
+
+
+def _drop_column(data, rng):
+    rows = [line.split(b",") for line in data.split(b"\n")]
+    at = rng.randrange(max(len(rows[0]), 1))
+    return b"\n".join(b",".join(cells[:at] + cells[at + 1 :]) for cells in rows)
+
+
+def _double_column(data, rng):
+    rows = [line.split(b",") for line in data.split(b"\n")]
+    at = rng.randrange(max(len(rows[0]), 1))
+    return b"\n".join(b",".join([*cells[: at + 1], *cells[at:]]) for cells in rows)
+
+
+def _rename_column(data, rng):
+    head, *rest = data.split(b"\n")
+    cells = head.split(b",")
+    cells[rng.randrange(len(cells))] = rng.choice(ODD_NAMES)
+    return b"\n".join([b",".join(cells), *rest])
+
+
+def _shuffle_rows(data, rng):
+    head, *rest = data.split(b"\n")
+    rng.shuffle(rest)
+    return b"\n".join([head, *rest])
+
+
+def _other_ends(data, rng):
+    return data.replace(b"\n", rng.choice((b"\r\n", b"\r", b"\n\n", b"\n\r", b";\n")))
+
+
+def _other_separator(data, rng):
+    return data.replace(b",", rng.choice((b";", b"\t", b", ", b" , ", b",,")))
+
+
+OF_TABLES = (
+    *(_odd_cell, _odd_cell, _scaled_number, _scaled_number, _drop_column, _double_column, _rename_column),
+    *(_shuffle_rows, _other_ends, _other_separator, _flip, _drop_line, _repeat_block, _truncate, _odd_bytes),
+)
+
+
+def _long_cell(data, rng):
+    at = rng.randint(0, len(data))
+    return data[:at] + rng.choice((b"1", b"a", b" ", b",", b'"', b"\n")) * 200_000 + data[at:]
+
+
+def mutate_table(data, rng):
+    """The same for a table in bytes: one in forty has 200,000 characters too many besides."""
+    for _ in range(rng.randint(1, 3)):
+        if data:
+            data = rng.choice(OF_TABLES)(data, rng)
+    return _long_cell(data, rng) if rng.random() < 1 / 40 else data

@@ -99,14 +99,16 @@ def test_the_truth_is_well_formed(script):
     assert list(expected) == ["about", "robot", "targets", "unresolved", "optional", "not_run"]
     assert [t["line"] for t in expected["targets"]] == sorted(t["line"] for t in expected["targets"])
     for target in all_targets(expected):
-        assert set(target) <= {"line", "kind", "joints", "pose", "near", "tool", "reached_at", *NUMBERS}
+        known = {"line", "kind", "joints", "pose", "near", "tool", "reached_at", "moved_by", *NUMBERS}
+        assert set(target) <= known
         assert ("joints" in target) != ("pose" in target)
         assert ("pose" in target) == ("reached_at" in target)
         for name in {"joints", "pose", "near", "tool", "reached_at"} & set(target):
             assert np.isfinite(target[name]).all()
             assert len(target[name]) == 6
         assert all(target[name] >= 0 for name in NUMBERS & set(target))
-        assert KINDS[target["kind"]] + "(" in lines[target["line"] - 1].replace(" ", "")
+        move = target.get("moved_by", target["line"])
+        assert KINDS[target["kind"]] + "(" in lines[move - 1].replace(" ", "")
     places = [all_targets(expected), expected["unresolved"], [{"line": n} for n in expected["not_run"]]]
     places = [{entry["line"] for entry in entries} for entries in places]
     assert sum(map(len, places)) == len(set.union(*places))

@@ -26,12 +26,27 @@ MOST_TURNS, TURNS_OF_ENDLESS = 200, 3
 class Pose(list):
     """x, y, z, rx, ry, rz."""
 
+    line = None  # where it was written, as long as nothing is done with it
+
+
+class Joints(list):
+    """A list that was written just like that."""
+
+    line = None
+
 
 class Reached:
     """Joints that the controller finds for a pose."""
 
     def __init__(self, pose, near, tool):
         self.pose, self.near, self.tool = pose, near, tool
+
+
+def _copied(value):
+    copy = type(value)(value)
+    if hasattr(value, "line"):
+        copy.line = value.line
+    return copy
 
 
 class _Leave(BaseException):
@@ -181,7 +196,7 @@ class Run:
 
     def assign(self, target, value, scope):
         """Values are copied: URScript has no references."""
-        value = type(value)(value) if isinstance(value, list) else value
+        value = _copied(value) if isinstance(value, list) else value
         if isinstance(target, ast.Subscript):
             where = self.globals if target.value.id not in scope else scope
             changed = type(where[target.value.id])(where[target.value.id])
@@ -201,9 +216,9 @@ class Run:
             case ast.Name():
                 return self.named(node.id, scope)
             case ast.List() | ast.Tuple():
-                return [self.value(item, scope) for item in node.elts]
+                return self.written(Joints(self.value(item, scope) for item in node.elts), node)
             case ast.Subscript(value=ast.Name(id="POSE")):
-                return Pose(self.value(node.slice, scope))
+                return self.written(Pose(self.value(node.slice, scope)), node)
             case ast.Subscript():
                 return self.value(node.value, scope)[int(self.value(node.slice, scope))]
             case ast.UnaryOp():
@@ -221,6 +236,10 @@ class Run:
             case ast.Call():
                 return self.call(node, scope)
         raise NotImplementedError(ast.dump(node))
+
+    def written(self, value, node):
+        value.line = node.lineno
+        return value
 
     def named(self, name, scope):
         if name in scope or name in self.globals:
@@ -310,6 +329,7 @@ class Run:
             stated["acceleration"] = arguments.get("a")
         for parameter, kind in targets:
             where, move = arguments[parameter], {"line": line, "kind": kind, "tool": list(self.tool)}
+            move["literal"] = getattr(where, "line", None)
             if isinstance(where, Reached):
                 move |= {"pose": list(where.pose), "near": where.near}
                 move["tool"] = list(self.tool if where.tool is None else where.tool)
@@ -348,9 +368,12 @@ def differences(program, expected, forward=None, most_runs=400, enough=12):
     tree = syntax(program)
     single = {(t["line"], t["kind"]): t for t in [*expected["targets"], *expected["optional"]]}
     several = {line["line"]: [] for line in expected["unresolved"]}
+    handed_on = {t["moved_by"] for t in expected["targets"] if "moved_by" in t}
     seen, wrong = set(), []
     for seed in range(most_runs):
         for move in Run(tree, seed, forward).moves:
+            if move["line"] in handed_on:
+                move["line"] = move["literal"]
             key = (move["line"], move["kind"])
             if move["line"] in several:
                 places = several[move["line"]]

@@ -7,9 +7,21 @@ import operator
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from truepath.programs.urscript.slots import slots_of_target
 from truepath.programs.urscript.source import Line
 from truepath.programs.urscript.syntax import Node
-from truepath.programs.urscript.values import PURE, JointsOf, Pose, Unknown, Value, all_finite, call_pure, is_number
+from truepath.programs.urscript.values import (
+    PURE,
+    JointsOf,
+    Pose,
+    Unknown,
+    Value,
+    all_finite,
+    call_pure,
+    is_joints,
+    is_number,
+)
+from truepath.programs.urscript.written import Written
 
 COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "==": operator.eq,
@@ -30,46 +42,68 @@ CONSTANTS: dict[str, Value] = {"pi": math.pi}
 MOST_ELEMENTS = 100_000
 
 
-class Scene(Protocol):
+class Asked(Protocol):
     """What an expression may ask of the program around it."""
 
-    def variable(self, name: str) -> Value: ...
+    def variable(self, name: str) -> Value | Written: ...
 
-    def call(self, node: Node, arguments: list[Value], keywords: dict[str, Value], line: Line) -> Value: ...
+    def call(self, node: Node, arguments: list[Value], keywords: dict[str, Value], line: Line) -> Value | Written: ...
 
     def start_thread(self, name: str) -> None: ...
 
+    def takes_literals(self, name: str) -> bool: ...
+
+    def written(self, value: Value, node: Node, line: Line) -> Written: ...
+
+    def used(self, value: Value | Written) -> Value: ...
+
 
 def word(node: Node | str, line: Line) -> str:
-    """A name as it stands in its line."""
+    """A name, number or string as it stands in its line."""
     if isinstance(node, str):
         return node
     return line.slots[node.slot] if node.slot >= 0 else str(node.args[0])
 
 
-def evaluate(node: Node, line: Line, scene: Scene) -> Value:
+def handed_on(node: Node, line: Line, scene: Asked) -> Value | Written:
+    """The same as ``evaluate`` for who does nothing with a value but hand it on: a literal keeps its place."""
+    op = node.op
+    if op == "name":
+        return _variable(word(node, line), scene)
+    if op == "call":
+        return _call(node, line, scene)
+    slots = slots_of_target(node) if op in ("pose", "list_") else None
+    if slots is not None:
+        values = tuple([sign * _number(line.slots[slot]) for slot, sign in slots])
+        if all(map(math.isfinite, values)):
+            return scene.written(Pose(tuple(map(float, values))) if op == "pose" else values, node, line)
+    value = evaluate(node, line, scene)
+    if (op == "pose" and isinstance(value, Pose)) or (op == "list_" and is_joints(value)):
+        return scene.written(value, node, line)
+    return value
+
+
+def evaluate(node: Node, line: Line, scene: Asked) -> Value:
     """A value, or Unknown with the reason."""
     op, args = node.op, node.args
     if op == "number":
-        return _number(line.slots[node.slot])
+        return _number(word(node, line))
     if op == "name":
-        name = word(node, line)
-        value = scene.variable(name)
-        return CONSTANTS.get(name, Unknown(f"{name} is not set")) if value is None else value
+        return scene.used(_variable(word(node, line), scene))
     if op == "pose":
         return _pose(args[1] or (), line, scene)
     if op == "list_":
         values = tuple(evaluate(each, line, scene) for each in args[0] or ())
-        return next((value for value in values if isinstance(value, Unknown)), values)
+        return next((value for value in values if isinstance(value, Unknown)), None) or _list(values)
     if op == "call":
-        return _call(node, line, scene)
+        return scene.used(_call(node, line, scene))
     if op == "negative":
         value = evaluate(args[0], line, scene)
         return -value if is_number(value) else _cannot("-", value)
     if op in ARITHMETIC:
         return _arithmetic(op, evaluate(args[0], line, scene), evaluate(args[1], line, scene))
     if op == "string":
-        return line.slots[node.slot][1:-1]
+        return word(node, line)[1:-1]
     if op in ("true", "false"):
         return op == "true"
     if op == "index":
@@ -77,7 +111,12 @@ def evaluate(node: Node, line: Line, scene: Scene) -> Value:
     return _rare(op, args, line, scene)
 
 
-def _rare(op: str, args: tuple[Any, ...], line: Line, scene: Scene) -> Value:
+def _variable(name: str, scene: Asked) -> Value | Written:
+    value = scene.variable(name)
+    return CONSTANTS.get(name, Unknown(f"{name} is not set")) if value is None else value
+
+
+def _rare(op: str, args: tuple[Any, ...], line: Line, scene: Asked) -> Value:
     if op == "compare":
         one, other = evaluate(args[0], line, scene), evaluate(args[2], line, scene)
         return _compare(str(args[1]), one, other)
@@ -103,10 +142,10 @@ def _number(text: str) -> float:
     return int(text) if text.isdigit() and len(text) < 16 else float(text)
 
 
-def _pose(nodes: tuple[Node, ...], line: Line, scene: Scene) -> Value:
+def _pose(nodes: tuple[Node, ...], line: Line, scene: Asked) -> Value:
     values = [evaluate(each, line, scene) for each in nodes]
     if len(values) == 1:  # the variable that is called p, with an index
-        return _index(scene.variable("p") or Unknown("p is not set"), values)
+        return _index(scene.used(_variable("p", scene)), values)
     for value in values:
         if isinstance(value, Unknown):
             return value
@@ -115,13 +154,22 @@ def _pose(nodes: tuple[Node, ...], line: Line, scene: Scene) -> Value:
     return Pose(tuple(float(value) for value in values))
 
 
-def _call(node: Node, line: Line, scene: Scene) -> Value:
+def _list(values: tuple[Value, ...]) -> Value:
+    """A list as long and as deep as the language has any use for: lists in lists in lists grow without end."""
+    inner = [value for value in values if isinstance(value, tuple)]
+    if sum(map(len, inner)) > MOST_ELEMENTS or any(isinstance(each, tuple) for value in inner for each in value):
+        return Unknown("lists in lists in lists are not followed")
+    return values
+
+
+def _call(node: Node, line: Line, scene: Asked) -> Value:
     arguments, keywords = [], {}
+    value_of = handed_on if scene.takes_literals(word(node.args[0], line)) else evaluate
     for each in node.args[1] or ():
         if each.op == "keyword":
-            keywords[word(each.args[0], line)] = evaluate(each.args[1], line, scene)
+            keywords[word(each.args[0], line)] = value_of(each.args[1], line, scene)
         else:
-            arguments.append(evaluate(each, line, scene))
+            arguments.append(value_of(each, line, scene))
     return scene.call(node, arguments, keywords, line)
 
 
@@ -146,7 +194,7 @@ def _joints_of(given: dict[str, Value]) -> Value:
             return value
     if not isinstance(pose, Pose) or not (tool is None or isinstance(tool, Pose)):
         return Unknown("get_inverse_kin() is called with something else than it takes")
-    if near is not None and not (isinstance(near, tuple) and all(map(is_number, near)) and len(near) == 6):
+    if near is not None and not (is_joints(near) and all_finite(near)):
         return Unknown("get_inverse_kin() needs six joints to be near to")
     return JointsOf(pose, None if near is None else tuple(float(each) for each in near), tool)
 
@@ -207,7 +255,7 @@ def with_element(value: Value, indices: list[Value], element: Value) -> Value:
     if isinstance(changed, Unknown):
         return changed
     if not isinstance(value, Pose):
-        return (*numbers[: int(index)], changed, *numbers[int(index) + 1 :])
+        return _list((*numbers[: int(index)], changed, *numbers[int(index) + 1 :]))
     if not is_number(changed) or not math.isfinite(changed):
         return Unknown("a pose has six finite numbers")
     return Pose((*numbers[: int(index)], float(changed), *numbers[int(index) + 1 :]))

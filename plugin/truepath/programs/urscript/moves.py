@@ -6,12 +6,15 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from truepath.programs.motions import Kind
+from truepath.programs.urscript.slots import SlotOf, signed_slot, slots_of_target
 from truepath.programs.urscript.source import Line
 from truepath.programs.urscript.syntax import Node, Shape
 from truepath.programs.urscript.tree import Statement
 from truepath.programs.urscript.values import JointsOf, Pose, Unknown, Value, is_joints
+from truepath.programs.urscript.written import Key, Written
 
-Key = tuple[int, int]  # line, column of the call in the shape
+# Line and column of the call, and of the literal elsewhere that it takes as its target, if it takes one.
+Step = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ class Move:
         previous: the moves from which the robot can come.
         origin: one of these that was made before this one; None if there is none.
         problem: why it cannot be resolved.
+        literal: its target, where that was written elsewhere and handed on.
     """
 
     name: str
@@ -62,9 +66,10 @@ class Move:
     targets: tuple[Value, ...]
     settings: dict[str, Value]
     tool: Value
-    previous: frozenset[Key]
+    previous: frozenset[Step]
     problem: str | None = None
-    origin: Key | None = None
+    literal: Written | None = None
+    origin: Step | None = None
 
     @property
     def line(self) -> Line:
@@ -85,15 +90,21 @@ class Move:
 
 @dataclass
 class Moves:
-    """All moves, by where they are written."""
+    """All moves.
 
-    by_key: dict[Key, Move] = field(default_factory=dict)
+    Attributes:
+        by_step: moves by where they are written, and by the literals that they take.
+        used: literals that serve for something else than targets of moves.
+    """
 
-    def note(self, key: Key, move: Move) -> None:
-        known = self.by_key.get(key)
+    by_step: dict[Step, Move] = field(default_factory=dict)
+    used: set[Key] = field(default_factory=set)
+
+    def note(self, step: Step, move: Move) -> None:
+        known = self.by_step.get(step)
         if known is None:
-            move.origin = min((each for each in move.previous if each in self.by_key), default=None)
-            self.by_key[key] = move
+            move.origin = min((each for each in move.previous if each in self.by_step), default=None)
+            self.by_step[step] = move
         else:
             known.merge(move)
 
@@ -105,8 +116,8 @@ class Literal:
     name: str
     node: Node
     is_pose: tuple[bool, ...]
-    targets: tuple[tuple[tuple[int, float], ...], ...]
-    settings: dict[str, tuple[int, float]]
+    targets: tuple[tuple[SlotOf, ...], ...]
+    settings: dict[str, SlotOf]
 
 
 @lru_cache(maxsize=20_000)
@@ -124,14 +135,12 @@ def literal(shape: Shape) -> Literal | None:
         return None
     targets, poses = [], []
     for target in signature.targets:
-        node = given[target]
-        elements = node.args[1] if node.op == "pose" else node.args[0] if node.op == "list_" else ()
-        numbers = [_signed(each) for each in elements or ()]
-        if len(numbers) != 6 or None in numbers:
+        slots = slots_of_target(given[target])
+        if slots is None:
             return None
-        targets.append(tuple(number for number in numbers if number))
-        poses.append(node.op == "pose")
-    settings = {each: _signed(node) for each, node in given.items() if each not in signature.targets}
+        targets.append(slots)
+        poses.append(given[target].op == "pose")
+    settings = {each: signed_slot(node) for each, node in given.items() if each not in signature.targets}
     if None in settings.values():
         return None
     plain = {each: number for each, number in settings.items() if number is not None}
@@ -151,15 +160,6 @@ def named(signature: Signature, call: Node) -> dict[str, Node] | None:
         else:
             return None
     return given
-
-
-def _signed(node: Node) -> tuple[int, float] | None:
-    if node.op == "number" and not str(node.args[0]).startswith(("0x", "0X")):
-        return node.slot, 1.0
-    if node.op == "negative" and node.args[0].op == "number":
-        inner = _signed(node.args[0])
-        return None if inner is None else (inner[0], -1.0)
-    return None
 
 
 def problem_of(name: str, targets: tuple[Value, ...], tool: Value) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from truepath.programs.urscript.evaluate import word
+from truepath.programs.urscript.syntax import Node
 from truepath.programs.urscript.tree import Statement
 
 DEFINES = ("function", "thread", "secondary")
@@ -10,18 +11,41 @@ DEFINES = ("function", "thread", "secondary")
 
 def all_statements(statements: list[Statement]) -> list[Statement]:
     """These and all inside them."""
-    found: list[Statement] = []
-    for statement in statements:
-        found.append(statement)
-        found += all_statements(statement.body)
+    found = list(statements)
+    for statement in found:  # grows while it is gone through
+        found += statement.body
         if statement.otherwise is not None:
-            found += all_statements([statement.otherwise])
+            found.append(statement.otherwise)
     return found
 
 
 def called_anywhere(statements: list[Statement]) -> set[str]:
     """Functions that are called somewhere."""
     return {word(call, each.line) for each in all_statements(statements) for call in each.shape.calls}
+
+
+def own_names(function: Statement) -> set[str]:
+    """Names that a function can give values in a scope of its own."""
+    found = {word(each.args[0] if each.op == "keyword" else each, function.line) for each in parameters(function)}
+    for each in all_statements(function.body):
+        if each.node.op == "assign":
+            found.add(assigned(each))
+    return found
+
+
+def parameters(function: Statement) -> tuple[Node, ...]:
+    """Of a function or thread."""
+    return function.node.args[1] or () if function.node.op == "function" else ()
+
+
+def assigned(statement: Statement) -> str:
+    """The variable that an assignment changes, or an element of which; empty if there is none."""
+    target = statement.node.args[1]
+    while target.op in ("index", "member"):
+        target = target.args[0]
+    if target.op == "pose" and len(target.args[1] or ()) == 1:  # the variable that is called p, with an index
+        return "p"
+    return word(target, statement.line) if target.op == "name" else ""
 
 
 def changed_by_threads(program: list[Statement]) -> set[str]:
@@ -38,9 +62,6 @@ def changed_by_threads(program: list[Statement]) -> set[str]:
         seen.add(id(function))
         for each in all_statements(function.body):
             if each.node.op == "assign" and each.node.args[0] != "local":
-                target = each.node.args[1]
-                while target.op in ("index", "member"):
-                    target = target.args[0]
-                changed.add("p" if target.op == "pose" else word(target, each.line))
+                changed.add(assigned(each))
             waiting += [functions[name] for name in (word(c, each.line) for c in each.shape.calls) if name in functions]
     return changed

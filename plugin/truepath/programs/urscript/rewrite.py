@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from truepath.lie import Array
 from truepath.programs.program import NewTargets, Via
 from truepath.programs.urscript.moves import MOVES, Literal, Move, literal, named
+from truepath.programs.urscript.source import Line
 from truepath.programs.urscript.syntax import Node, columns
 from truepath.programs.urscript.values import JointsOf
+from truepath.programs.urscript.written import Written
 
-Sites = Sequence[tuple[Move, int]]  # per target, the move that it belongs to and which of its targets it is
+LINE_END = re.compile(r"\r\n?|\n")
 DECIMALS = 9  # a nanometre, a nanoradian
 JOINTS_TEXT = "[" + ", ".join([f"%.{DECIMALS}f"] * 6) + "]"
 
 
-def rewritten(text: str, sites: Sites, new: NewTargets, vias: Sequence[Via] = (), header: str = "") -> str:
+class Site(NamedTuple):
+    """Where a target is written.
+
+    Attributes:
+        move: to which it belongs.
+        which: of the targets of the move it is.
+        literal: that stands elsewhere and is handed to the move; None: the move's own argument.
+    """
+
+    move: Move
+    which: int
+    literal: Written | None
+
+    @property
+    def line(self) -> Line:
+        return self.move.line if self.literal is None else self.literal.line
+
+
+def rewritten(text: str, sites: Sequence[Site], new: NewTargets, vias: Sequence[Via] = (), header: str = "") -> str:
     """The program with new targets, with vias added before their moves, and with a header line at its start."""
     texts = _texts(new)
     edits: list[tuple[int, int, str]] = []
@@ -29,8 +51,9 @@ def rewritten(text: str, sites: Sites, new: NewTargets, vias: Sequence[Via] = ()
     for via in vias:
         by_move.setdefault(via.before, []).append(via)
     for at, added in by_move.items():
-        move = sites[at][0]
-        edits.append((move.line.start, move.line.start, "".join(_via_line(move, via) for via in added)))
+        move = sites[at].move
+        end = _line_end(move.line.whole, _line_end(text))
+        edits.append((move.line.start, move.line.start, "".join(_via_line(move, via, end) for via in added)))
         edits += _rest_of_the_time(move, 1.0 - sum(via.share for via in added))
     text = _applied(text, edits)
     if header:
@@ -39,10 +62,13 @@ def rewritten(text: str, sites: Sites, new: NewTargets, vias: Sequence[Via] = ()
     return text
 
 
-def stands_alone(move: Move) -> bool:
-    """Whether nothing else stands on the line of a move, so that another line can be put before it."""
-    node = move.statement.node
-    return move.statement.alone and node.op == "expression" and node.args[0] is move.node
+def stands_alone(site: Site) -> bool:
+    """Whether nothing else stands on the line of a move, so that another line can be put before it.
+
+    A move that takes several literals goes elsewhere each time: no line before it would do for all.
+    """
+    move, node = site.move, site.move.statement.node
+    return site.literal is None and move.statement.alone and node.op == "expression" and node.args[0] is move.node
 
 
 def _applied(text: str, edits: list[tuple[int, int, str]]) -> str:
@@ -53,9 +79,10 @@ def _applied(text: str, edits: list[tuple[int, int, str]]) -> str:
     return "".join([*parts, text[known:]])
 
 
-def _line_end(text: str) -> str:
-    at = text.find("\n")
-    return "\r\n" if at > 0 and text[at - 1] == "\r" else "\n"
+def _line_end(text: str, otherwise: str = "\n") -> str:
+    """The first line end of a text."""
+    found = LINE_END.search(text)
+    return otherwise if found is None else found[0]
 
 
 def _texts(new: NewTargets) -> list[str]:
@@ -67,11 +94,11 @@ def _texts(new: NewTargets) -> list[str]:
     ]
 
 
-def _edit(site: tuple[Move, int], text: str, is_pose: bool, near: Array) -> tuple[int, int, str]:
-    move, which = site
-    shape, line = move.statement.shape, move.line
+def _edit(site: Site, text: str, is_pose: bool, near: Array) -> tuple[int, int, str]:
+    move, which, written = site
+    shape, line = (move.statement.shape, move.line) if written is None else (written.shape, written.line)
     plain = literal(shape) if not move.targets else None
-    node = _target_node(plain, move, which)
+    node = _target_node(plain, move, which) if written is None else written.node
     if is_pose:
         node, text = _as_pose(node, text, move, which, near)
     start, end = columns(node, shape, line)
@@ -107,7 +134,7 @@ def _as_pose(node: Node, text: str, move: Move, which: int, near: Array) -> tupl
     return node, text
 
 
-def _via_line(move: Move, via: Via) -> str:
+def _via_line(move: Move, via: Via, line_end: str) -> str:
     """The move once more with other targets and its own blend, on a line of its own."""
     line, shape = move.line, move.statement.shape
     indentation = line.whole[: len(line.whole) - len(line.whole.lstrip())]
@@ -124,7 +151,7 @@ def _via_line(move: Move, via: Via) -> str:
         texts["t"] = f"{via.share:.6f}*({texts['t']})"
     texts["r"] = f"{via.blend_m:.6f}"
     stated = ", ".join(value if name in signature.targets else f"{name}={value}" for name, value in texts.items())
-    return f"{indentation}{move.name}({stated}){_line_end(line.whole)}"
+    return f"{indentation}{move.name}({stated}){line_end}"
 
 
 def _stated_time(move: Move) -> Node | None:
@@ -132,7 +159,7 @@ def _stated_time(move: Move) -> Node | None:
     node = _by_name(move.node, move.name).get("t")
     if node is None:
         return None
-    zero = node.op == "number" and float(move.line.slots[node.slot]) == 0.0
+    zero = node.op == "number" and node.slot >= 0 and float(move.line.slots[node.slot]) == 0.0
     return None if zero else node
 
 

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from truepath.errors import InputError
-from truepath.lie import Array, make_pose
-from truepath.programs.motions import Kind, Motions
+from truepath.programs.motions import Motions
 from truepath.programs.program import NewTargets, Unresolved, Via
+from truepath.programs.urscript.collector import collector_at_rest
 from truepath.programs.urscript.follow import Follower
-from truepath.programs.urscript.moves import MOVES, Key, Move, literal
-from truepath.programs.urscript.rewrite import rewritten, stands_alone
-from truepath.programs.urscript.state import ELSEWHERE, START
+from truepath.programs.urscript.literals import resolve
+from truepath.programs.urscript.rewrite import Site, rewritten, stands_alone
+from truepath.programs.urscript.targets import motions_of
 from truepath.programs.urscript.tree import parse
-from truepath.programs.urscript.values import JointsOf, Pose, Value, is_number, matrix
+from truepath.programs.urscript.values import Pose
 
 NO_TOOL = Pose((0.0,) * 6)
 LARGEST_FILE = 200_000_000
-SETTINGS = ("v", "a", "t", "r")
-FARTHEST_M = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +34,7 @@ class Script:
         text: the same; bytes that are no UTF-8 are kept as surrogates.
         motions: its targets, in the order in which they are written.
         unresolved: moves that stay as they are.
-        sites: per target, the move that it belongs to and which of its targets it is.
+        sites: per target, where it is written.
         states_tool: whether it is known with which tool it works.
     """
 
@@ -46,21 +43,22 @@ class Script:
     text: str
     motions: Motions
     unresolved: tuple[Unresolved, ...]
-    sites: tuple[tuple[Move, int], ...]
+    sites: tuple[Site, ...]
     states_tool: bool
     comment: str | None = "#"
 
     def statement(self, at: int) -> str:
         """The line of a target without its comment."""
-        return self.sites[at][0].line.code.strip()
+        return self.sites[at].line.code.strip()
 
     def can_be_added_before(self, at: int) -> bool:
-        """Whether the move of a target stands alone on its line."""
-        return stands_alone(self.sites[at][0])
+        """Whether the move of a target stands alone on its line, and goes nowhere else."""
+        return stands_alone(self.sites[at])
 
     def rewritten(self, new: NewTargets, vias: Sequence[Via], header: str) -> bytes:
         """Its content with new targets, lines added before their moves, and a first line."""
-        return rewritten(self.text, self.sites, new, vias, header).encode("utf-8", "surrogateescape")
+        with collector_at_rest():
+            return rewritten(self.text, self.sites, new, vias, header).encode("utf-8", "surrogateescape")
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -97,122 +95,12 @@ def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> 
         raise InputError("this is no text", file=file, line=line, expected="a program", found="a zero byte")
     text = raw.decode("utf-8", "surrogateescape")
     start = NO_TOOL if tool is None else Pose(tuple(float(each) for each in tool))
-    moves = Follower(parse(text, file), file, start).moves.by_key
-    resolved: list[tuple[Key, Move]] = []
-    unresolved = []
-    for key in sorted(moves):
-        move = moves[key]
-        if move.problem is None:
-            resolved.append((key, move))
-        else:
-            unresolved.append(Unresolved(move.line.number, move.line.code.strip(), move.problem))
-    motions, sites = _motions(resolved, moves, start, file)
+    with collector_at_rest():
+        try:
+            moves = Follower(parse(text, file), file, start).moves
+        except RecursionError:
+            raise InputError("calls, blocks and brackets are too deep to be followed", file=file) from None
+        resolved, left = resolve(moves)
+        motions, sites = motions_of(resolved, moves.by_step, start, file)
+    unresolved = [Unresolved(move.line.number, move.line.code.strip(), str(move.problem)) for _, move in left]
     return Script(file, raw, text, motions, tuple(unresolved), sites, bool(np.any(motions.tool)) or tool is not None)
-
-
-def _motions(
-    resolved: list[tuple[Key, Move]], moves: Mapping[Key, Move], start: Pose, file: str
-) -> tuple[Motions, tuple[tuple[Move, int], ...]]:
-    tools: dict[Value, int] = {start: 0}
-    sites: list[tuple[Move, int]] = []
-    last_site: dict[Key, int] = {}
-    by_shape: dict[int, list[int]] = {}
-    for number, (key, move) in enumerate(resolved):
-        if not move.targets:
-            by_shape.setdefault(id(move.statement.shape), []).append(number)
-        sites += [(move, which) for which in range(len(MOVES[move.name].kinds))]
-        last_site[key] = len(sites) - 1
-    count = len(sites)
-    first_site = np.array([last_site[key] - len(MOVES[move.name].kinds) + 1 for key, move in resolved], int)
-    q, pose, near = (np.full((count, 6), np.nan) for _ in range(3))
-    settings = {name: np.full(count, np.nan) for name in SETTINGS}
-    for numbers in by_shape.values():
-        _fill_literal([resolved[number][1] for number in numbers], first_site[numbers], q, pose, settings)
-    for at, (move, which) in enumerate(sites):
-        if not move.targets:
-            continue
-        target = move.targets[which]
-        if isinstance(target, Pose):
-            pose[at] = target.values
-        elif isinstance(target, JointsOf):
-            pose[at] = target.pose.values
-            near[at] = np.nan if target.q_near is None else target.q_near
-        else:
-            q[at] = target
-        for name in SETTINGS:
-            value = move.settings.get(name)
-            if is_number(value):
-                settings[name][at] = value
-    previous, origin = np.full(count, -1), np.full(count, -1)
-    kind, tool, line = (np.zeros(count, int) for _ in range(3))
-    starts = np.zeros(count, bool)
-    for at, (move, which) in enumerate(sites):
-        kind[at] = MOVES[move.name].kinds[which]
-        line[at] = move.line.number
-        tool[at] = tools.setdefault(move.tool, len(tools)) if isinstance(move.tool, Pose) else 0
-        if which:
-            previous[at] = origin[at] = at - 1
-            continue
-        starts[at] = START in move.previous
-        if len(move.previous) == 1:
-            (only,) = move.previous
-            previous[at] = last_site.get(only, -1)
-        origin[at] = last_site.get(_last_resolved(move, moves), -1)
-    _require_sense(q, pose, line, file)
-    X_CT = make_pose(Rotation.from_rotvec(np.nan_to_num(pose[:, 3:])).as_matrix(), pose[:, :3])
-    motions = Motions(
-        kind=kind,
-        q_rad=q,
-        X_CT=X_CT,
-        q_near_rad=near,
-        tools=np.stack([matrix(each) for each in tools]),
-        tool=tool,
-        line=line,
-        previous=previous,
-        origin=origin,
-        starts=starts,
-        speed=settings["v"],
-        acceleration=settings["a"],
-        time_s=np.where(settings["t"] > 0, settings["t"], np.nan),  # zero: by speed and acceleration
-        blend_m=np.where(kind == Kind.THROUGH, np.nan, settings["r"]),
-    )
-    return motions, tuple(sites)
-
-
-def _last_resolved(move: Move, moves: Mapping[Key, Move]) -> Key:
-    """The move before one, past those along lines that cannot be resolved: on a line no posture changes."""
-    origin = move.origin
-    while origin is not None and moves[origin].problem is not None:
-        origin = moves[origin].origin if moves[origin].name in ("movel", "movep", "movec") else None
-    return origin or ELSEWHERE
-
-
-def _fill_literal(moves: list[Move], sites: Array, q: Array, pose: Array, settings: Mapping[str, Array]) -> None:
-    """Moves of one shape whose arguments are plain numbers."""
-    plain = literal(moves[0].statement.shape)
-    assert plain is not None
-    slots = [move.line.slots for move in moves]
-
-    def numbers(slot: int, sign: float) -> Array:
-        return sign * np.array([each[slot] for each in slots], dtype=float)
-
-    for which, (target, is_pose) in enumerate(zip(plain.targets, plain.is_pose, strict=True)):
-        (pose if is_pose else q)[sites + which] = np.stack([numbers(*each) for each in target], axis=1)
-    for name in SETTINGS:
-        if name in plain.settings:
-            for which in range(len(plain.targets)):
-                settings[name][sites + which] = numbers(*plain.settings[name])
-
-
-def _require_sense(q: Array, pose: Array, line: Array, file: str) -> None:
-    largest = np.nanmax(np.abs(np.concatenate([q, pose], axis=1)), axis=1, initial=0.0)
-    wrong = ~(largest < FARTHEST_M)
-    if wrong.any():
-        k = int(np.argmax(wrong))
-        raise InputError(
-            "a target far from any robot",
-            file=file,
-            line=int(line[k]),
-            expected=f"numbers below {FARTHEST_M:g}, in m and rad",
-            found=f"{largest[k]:g}",
-        )

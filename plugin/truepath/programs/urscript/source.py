@@ -15,12 +15,13 @@ from truepath.errors import InputError
 
 LONGEST_LINE, MOST_JOINED, DEEPEST = 100_000, 2000, 60
 LINE = re.compile(r"[^\r\n]*(?:\r\n?|\n)|[^\r\n]+\Z")
-LABEL = re.compile(r"\s*\$\s*\d+\b")  # PolyScope marks the nodes of its program tree: $ 3 "MoveJ"
+LABEL = re.compile(r"\s*\$\s*[0-9]+\b")  # PolyScope marks the nodes of its program tree: $ 3 "MoveJ"
 CODE = re.compile(r"""(?:[^#"']|"[^"]*"|'[^']*')*""")
 TEXTS = re.compile(r""""[^"]*"|'[^']*'""")
 SLOT = re.compile(
-    r"""((?<![\w.])(?:\d+\.?\d*(?:[eE][+-]?\d+)?(?!\w)|0[xX][0-9a-fA-F]+(?!\w)|\.\d+(?:[eE][+-]?\d+)?(?!\w)"""
-    r"""|[A-Za-z_]+\d\w*)|"[^"]*"|'[^']*')"""
+    r"""((?<![\w.])(?:\d+\.?\d*(?:[eE][+-]?\d+)?(?!\w)|\.\d+(?:[eE][+-]?\d+)?(?!\w)|[A-Za-z_]+\d\w*)"""
+    r"""|"[^"]*"|'[^']*')""",
+    re.ASCII,
 )
 # What a slot is shows in its first character.
 FIRST = {**dict.fromkeys(".0123456789", "#"), **dict.fromkeys("\"'", "s"), **dict.fromkeys(ascii_letters + "_", "n")}

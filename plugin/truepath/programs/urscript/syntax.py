@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,12 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truepath.errors import InputError
-from truepath.programs.urscript.source import DEEPEST, SLOT, Line, nesting
+from truepath.programs.urscript.source import DEEPEST, Line, nesting
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
 
-KEPT_SHAPES = 20_000
+KEPT_SHAPES, KEPT_FOR_OTHERS, DEEPEST_NODES = 20_000, 2000, 200
+MOST_PARSED = 120_000  # words and signs; a line that differs from one before it in numbers only is not parsed again
+WORDS = re.compile(r"\w+|[^\w\s]")
 UNFOLDED = {"positional", "group", "positive"}
 
 
@@ -51,6 +54,9 @@ class Shape:
     calls: tuple[Node | str, ...]
 
 
+_OF_ALL_PROGRAMS: dict[str, Shape] = {}  # programs of one cell are alike
+
+
 class Shapes:
     """Parses lines, each shape once.
 
@@ -60,6 +66,7 @@ class Shapes:
     def __init__(self, file: str) -> None:
         self.file = file
         self._known: dict[str, Shape] = {}
+        self._parsed_so_far = 0
 
     def of(self, line: Line) -> Shape:
         """The shape of a line.
@@ -69,9 +76,22 @@ class Shapes:
         """
         shape = self._known.get(line.shape)
         if shape is None:
-            shape = self._parsed(line)
+            shape = self._first(line)
             if len(self._known) < KEPT_SHAPES:
                 self._known[line.shape] = shape
+        return shape
+
+    def _first(self, line: Line) -> Shape:
+        """The shape of a line that is the first of its shape in the program."""
+        self._parsed_so_far += len(WORDS.findall(line.code))
+        if self._parsed_so_far > MOST_PARSED:
+            raise InputError("too many different statements for one program", file=self.file, line=line.number)
+        shape = _OF_ALL_PROGRAMS.get(line.shape)
+        if shape is None:
+            shape = self._parsed(line)
+            if len(_OF_ALL_PROGRAMS) >= KEPT_FOR_OTHERS:
+                _OF_ALL_PROGRAMS.clear()
+            _OF_ALL_PROGRAMS[line.shape] = shape
         return shape
 
     def _parsed(self, line: Line) -> Shape:
@@ -83,10 +103,13 @@ class Shapes:
             tree = _parser().parse(line.code)
         except UnexpectedInput as error:
             raise self._complaint(line, error) from None
-        spans = tuple(match.span() for match in SLOT.finditer(line.code))
+        spans = tuple(line.slot_spans())
         slots = {start: index for index, (start, _) in enumerate(spans)}
         calls = tuple(_node(call.children[0], slots) for call in tree.find_data("call"))
-        return Shape(tuple(_node(item, slots) for item in tree.children), spans, calls)
+        try:
+            return Shape(tuple(_node(item, slots) for item in tree.children), spans, calls)
+        except _TooDeep:
+            raise InputError("the expression is too deep", file=self.file, line=line.number) from None
 
     def _complaint(self, line: Line, error: Any) -> InputError:
         at = getattr(error, "pos_in_stream", None)
@@ -113,6 +136,10 @@ def columns(node: Node, shape: Shape, line: Line) -> tuple[int, int]:
     return node.start + shift_start, node.end + shift_end
 
 
+class _TooDeep(Exception):  # noqa: N818
+    """No expression that a person or a post-processor writes."""
+
+
 @lru_cache(maxsize=1)
 def _parser() -> Lark:
     from lark import Lark
@@ -121,11 +148,13 @@ def _parser() -> Lark:
     return Lark(grammar, parser="lalr", propagate_positions=True, maybe_placeholders=True)
 
 
-def _node(tree: Tree[Token] | Token | None, slots: dict[int, int]) -> Any:
+def _node(tree: Tree[Token] | Token | None, slots: dict[int, int], depth: int = 0) -> Any:
     from lark import Token
 
     if tree is None:
         return None
+    if depth > DEEPEST_NODES:
+        raise _TooDeep
     if isinstance(tree, Token):
         # A token with its own slot differs from line to line.
         at = tree.start_pos or 0
@@ -133,7 +162,7 @@ def _node(tree: Tree[Token] | Token | None, slots: dict[int, int]) -> Any:
         return Node("token", (str(tree),), slot, at, tree.end_pos or at) if slot >= 0 else str(tree)
     children = tree.children
     if tree.data in UNFOLDED:
-        return _node(children[0], slots)
+        return _node(children[0], slots, depth + 1)
     if tree.data in ("number", "string", "name"):
         token = children[0]
         assert isinstance(token, Token)
@@ -142,8 +171,8 @@ def _node(tree: Tree[Token] | Token | None, slots: dict[int, int]) -> Any:
     args = []
     for child in children:
         if not isinstance(child, Token) and child is not None and child.data in ("list", "arguments"):
-            args.append(tuple(_node(each, slots) for each in child.children))
+            args.append(tuple(_node(each, slots, depth + 1) for each in child.children))
         else:
-            args.append(_node(child, slots))
+            args.append(_node(child, slots, depth + 1))
     meta = tree.meta
     return Node(str(tree.data), tuple(args), -1, getattr(meta, "start_pos", 0), getattr(meta, "end_pos", 0))

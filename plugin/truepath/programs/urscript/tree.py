@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from truepath.errors import InputError
 from truepath.programs.urscript.source import Line, logical_lines
@@ -20,7 +20,7 @@ class Statement:
     Attributes:
         node: its own line, or its part of it.
         line, shape: where it stands.
-        body: statements of its block.
+        body: statements of its block; empty where it opens none.
         otherwise: for ``if_``: the ``elif_`` or ``else_`` that follows.
         alone: no other statement stands on its line.
     """
@@ -28,9 +28,12 @@ class Statement:
     node: Node
     line: Line
     shape: Shape
-    body: list[Statement] = field(default_factory=list)
+    body: list[Statement]
     otherwise: Statement | None = None
     alone: bool = True
+
+
+NOTHING: list[Statement] = []
 
 
 def parse(text: str, file: str) -> list[Statement]:
@@ -54,7 +57,8 @@ def parse(text: str, file: str) -> list[Statement]:
                 open_blocks.pop()
                 bodies.pop()
                 continue
-            statement = Statement(node, line, shape, alone=alone)
+            opens = op in OPENS or op in GOES_ON
+            statement = Statement(node, line, shape, [] if opens else NOTHING, alone=alone)
             if op in GOES_ON:
                 opened = open_blocks.pop() if open_blocks else None
                 if opened is None or opened.node.op not in ("if_", "elif_"):
@@ -63,7 +67,7 @@ def parse(text: str, file: str) -> list[Statement]:
                 bodies.pop()
             else:
                 bodies[-1].append(statement)
-            if op in OPENS or op in GOES_ON:
+            if opens:
                 if len(open_blocks) >= DEEPEST_BLOCKS:
                     raise InputError("blocks too deep", file=file, line=line.number, expected=f"{DEEPEST_BLOCKS}")
                 open_blocks.append(statement)

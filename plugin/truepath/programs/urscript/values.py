@@ -34,9 +34,15 @@ class JointsOf:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """Nobody can tell before the program runs, and why; equal to nothing but itself for the same reason."""
+    """Nobody can tell before the program runs.
+
+    Attributes:
+        why: in plain words.
+        literals: line and column of each that it may stand for.
+    """
 
     why: str
+    literals: frozenset[tuple[int, int]] = frozenset()
 
 
 Value = Any  # bool, float, str, tuple, Pose, JointsOf, Unknown

@@ -1,0 +1,1 @@
+"""What the tests of programs share lies in this folder."""

@@ -1,0 +1,113 @@
+"""What is read of a program, against truth that was written with it; and that nothing else becomes of it."""
+
+import numpy as np
+import pytest
+from generate import program
+from scripts import SCRIPTS, differs_elsewhere, expected_of, faults, new_targets, nothing_new, read
+from truepath.errors import InputError
+
+MANY = 1000
+CALL = "movel(p[0.1, 0.2, 0.3, 0, 0, 0], a=1, v=0.1)"
+
+
+def truth_of(made):
+    return {"targets": made.targets, "unresolved": [{"line": n} for n in made.unresolved_lines], "optional": []}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_the_corpus_is_read_as_it_was_meant(script):
+    assert faults(read(script.read_bytes()), expected_of(script)) == []
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_the_corpus_stays_as_it_is_to_the_byte(script):
+    assert read(script.read_bytes()).rewritten(nothing_new(), [], "") == script.read_bytes()
+
+
+def test_generated_programs_are_read_as_they_were_made_and_stay_as_they_are():
+    for seed in range(MANY):
+        made = program(seed, statements=2 + seed % 12)
+        parsed = read(made.data)
+        assert faults(parsed, truth_of(made)) == [], seed
+        assert parsed.rewritten(nothing_new(), [], "") == made.data, seed
+
+
+def written_and_read_again(data, seed):
+    before = read(data)
+    new = new_targets(before.motions, seed)
+    content = before.rewritten(new, [], "")
+    after = read(content)
+    if len(after.motions) > len(before.motions):  # a literal that was computed with serves for nothing else any more
+        new_lines = set(after.motions.line.tolist()) - set(before.motions.line.tolist())
+        kept = [at for at, line in enumerate(after.motions.line) if line not in new_lines]
+        np.testing.assert_array_equal(after.motions.q_rad[kept][~new.is_pose], new.values[~new.is_pose])
+        return content, new.values
+    assert [vars(each) for each in after.unresolved] == [vars(each) for each in before.unresolved]
+    np.testing.assert_array_equal(after.motions.line, before.motions.line)
+    np.testing.assert_array_equal(after.motions.is_pose, new.is_pose)
+    joints = ~new.is_pose
+    np.testing.assert_array_equal(after.motions.q_rad[joints], new.values[joints])
+    np.testing.assert_allclose(after.motions.X_CT[new.is_pose][:, :3, 3], new.values[new.is_pose][:, :3], atol=1e-15)
+    for name in ("speed", "acceleration", "time_s", "blend_m", "tools", "tool", "previous", "origin"):
+        np.testing.assert_array_equal(getattr(after.motions, name), getattr(before.motions, name), name)
+    near = after.motions.q_near_rad
+    stays = np.all(near == before.motions.q_near_rad, axis=1) | np.isnan(near[:, 0])
+    np.testing.assert_array_equal(near[~stays], new.q_near_rad[~stays])
+    return content, new.values
+
+
+ON_ONE_LINE = [script for script in SCRIPTS if expected_of(script)["targets"]]
+
+
+@pytest.mark.parametrize("script", ON_ONE_LINE, ids=lambda script: script.stem)
+def test_new_targets_and_nothing_else_are_written_into_the_corpus(script):
+    content, values = written_and_read_again(script.read_bytes(), 1)
+    assert not differs_elsewhere(script.read_bytes(), content, values)
+
+
+def test_new_targets_are_written_into_generated_programs():
+    for seed in range(MANY, MANY + 60):
+        data = program(seed).data
+        written_and_read_again(data, seed)
+
+
+def test_a_tool_that_was_stated_beforehand_holds_until_the_program_sets_one():
+    parsed = read(f"{CALL}\nset_tcp(p[0,0,0.2,0,0,0])\n{CALL}\n", tool=(0, 0, 0.1, 0, 0, 0))
+    assert parsed.motions.X_0T[:, 2, 3].tolist() == [0.1, 0.2]
+    assert parsed.states_tool
+
+
+@pytest.mark.parametrize(
+    ("data", "line", "word"),
+    [
+        (b"movej([0,0,0,0,0,0])\n\x00", 2, "zero byte"),
+        ("movel(".encode("utf-16"), None, "UTF-8"),
+        (b"sync()\nmovel(p[0,0,0,0,0,0]\n", 2, "bracket"),
+        (b"sync()\nx = = 1\n", 2, "understood"),
+        (b"def f():\nsync()\n", 1, "'def' is not closed"),
+        (b"sync()\nend\n", 2, "too many"),
+        (b"if a:\nelse:\nelse:\nend\n", 3, "'else' without"),
+        (b"movel(p[1e4,0,0,0,0,0])\n", 1, "far from any robot"),
+        (b"sync()\nmovej(get_inverse_kin(p[0,0,0,0,0,0], [0,0,0,0,0,9e9]))\n", 2, "far from any robot"),
+        (b"1 = 2\n", 1, "nothing can be put there"),
+    ],
+)
+def test_what_is_no_program_is_refused_with_its_line(data, line, word):
+    with pytest.raises(InputError) as caught:
+        read(data)
+    assert caught.value.line == line
+    assert word in str(caught.value)
+    assert "p.script" in str(caught.value)
+
+
+@pytest.mark.parametrize("number", ["1e999", "9" * 400, "nan", "0x1F/0"])
+def test_a_number_that_is_none_is_never_a_target(number):
+    text = f"x = {number}\nmovel(p[x, 0, 0, 0, 0, 0])\nmovej(get_inverse_kin(p[0,0,0,0,0,0], [0,0,0,0,0,x]))\n"
+    parsed = read(text)
+    assert len(parsed.motions) == 0
+    assert [each.line for each in parsed.unresolved] == [2, 3]
+
+
+def test_hexadecimal_numbers_are_read_beside_decimal_ones():
+    parsed = read("movej([1,0,0,0,0,0])\nmovej([0x2,0,0,0,0,0])\nmovej([3,0,0,0,0,0])\n")
+    assert parsed.motions.q_rad[:, 0].tolist() == [1.0, 2.0, 3.0]
