@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -46,6 +46,8 @@ class Motions:
         speed, acceleration: ``(N,)`` of the tool in m/s and m/s^2, for JOINT of the leading joint in rad/s and rad/s^2.
         time_s: ``(N,)`` stated for the motion, instead of its speed.
         blend_m: ``(N,)`` radius.
+        rotation_vector: ``(N, 3)`` of poses as written, rad; not the shortest one perhaps. None if nobody knows.
+        possible: ``(P, 2)`` from where and to where the robot can go, for targets to which several motions lead.
     """
 
     kind: Array
@@ -62,6 +64,8 @@ class Motions:
     acceleration: Array
     time_s: Array
     blend_m: Array
+    rotation_vector: Array | None = None
+    possible: Array = field(default_factory=lambda: np.empty((0, 2), int))
 
     def __len__(self) -> int:
         return len(self.kind)

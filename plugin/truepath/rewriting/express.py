@@ -48,12 +48,15 @@ def express(
     X_CT = controller.tool_poses(q, motions.X_0T)
     for index, sample in vias.through.items():
         q[index], X_CT[index], changed[index] = ways.q_corrected_rad[sample], ways.X_CT_commanded[sample], True
-    poses = _turned_alike(vectors_from_poses(X_CT), motions.X_CT)
+    poses = _turned_alike(vectors_from_poses(X_CT), motions.rotation_vector)
     # An arm may have more joints than a pose has numbers; then all targets are of one form.
     values = q if not is_pose.any() else poses if is_pose.all() else np.where(is_pose[:, None], poses, q)
     kept = np.flatnonzero(changed)
     targets = NewTargets(plan.index[kept], values[kept], is_pose[kept], q[kept])
-    vectors = _turned_alike(vectors_from_poses(ways.X_CT_commanded), ways.X_CT)
+    vectors = vectors_from_poses(ways.X_CT_commanded)
+    if motions.rotation_vector is not None:
+        way = np.repeat(np.arange(len(ways.target)), np.diff(ways.first))
+        vectors = _turned_alike(vectors, motions.rotation_vector[ways.target[way]])
     written = []
     for via in vias.added:
         pose = bool(is_pose[via.target])
@@ -63,18 +66,17 @@ def express(
     return Expressed(targets, written)
 
 
-def _turned_alike(vectors: Array, X_meant: Array) -> Array:
-    """Pose vectors ``(N, 6)`` whose rotation vector is, of the two that mean the same, the one nearer to that meant.
+def _turned_alike(vectors: Array, written: Array | None) -> Array:
+    """Pose vectors ``(N, 6)`` whose rotation vector is, of the two that mean the same, the one nearer to that written.
 
     Near half a turn the two point to opposite sides; a reader shall not wonder why the tool turned over.
     """
+    if written is None:
+        return vectors
     turn = vectors[:, 3:]
     angle = np.linalg.norm(turn, axis=1, keepdims=True)
     other = np.divide(turn * (angle - 2 * np.pi), angle, out=turn.copy(), where=angle > 0)
-    meant = np.nan_to_num(
-        vectors_from_poses(np.nan_to_num(X_meant, nan=0.0) + np.where(np.isnan(X_meant), np.eye(4), 0))
-    )
-    nearer = np.linalg.norm(other - meant[:, 3:], axis=1) < np.linalg.norm(turn - meant[:, 3:], axis=1)
+    nearer = np.linalg.norm(other - written, axis=1) < np.linalg.norm(turn - written, axis=1)  # never for NaN
     return np.where(nearer[:, None], np.hstack([vectors[:, :3], other]), vectors)
 
 

@@ -19,6 +19,7 @@ from truepath.postures import follow_targets
 from truepath.programs.motions import Kind, Motions
 from truepath.robot import NominalRobot
 
+OF_THE_WHOLE = ("tools", "possible")  # of a program, not of each of its targets
 BY_TOOL = (Kind.LINEAR, Kind.PROCESS, Kind.THROUGH, Kind.ARC)
 
 
@@ -123,5 +124,6 @@ def select(motions: Motions, kept: Array) -> Motions:
     """Some of the targets; a target whose predecessor is not among them comes from nobody knows where."""
     place = np.full(len(motions) + 1, -1)  # the last one is that of "not known"
     place[kept] = np.arange(len(kept))
-    parts = {part.name: getattr(motions, part.name)[kept] for part in fields(motions) if part.name != "tools"}
+    each = {part.name: getattr(motions, part.name) for part in fields(motions) if part.name not in OF_THE_WHOLE}
+    parts = {name: values[kept] for name, values in each.items() if values is not None}
     return replace(motions, **{**parts, "previous": place[parts["previous"]], "origin": place[parts["origin"]]})

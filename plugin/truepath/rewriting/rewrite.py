@@ -19,6 +19,7 @@ from truepath.guards import Finding, calibration_findings, condense
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
 from truepath.programs.program import Program, Unresolved
+from truepath.rewriting.doubtful import doubtful_findings
 from truepath.rewriting.express import Expressed, express, tool_errors_mm
 from truepath.rewriting.named_robot import robot_named_in
 from truepath.rewriting.open import open_program
@@ -164,6 +165,9 @@ def rewrite(
         *calibration_findings(calibration, robot_named_in(program.text), today, options.max_age_days),
         *findings,
         *_too_far_off(plan, ways, vias, tolerance_mm, program),
+        *doubtful_findings(
+            plan, motions.possible, X_end, model, controller, tolerance_mm, options.max_correction_mm, file
+        ),
         *watch(plan, correction.q_rad, ways, calibration, options.cell),
     ]
     _refuse(findings, file)

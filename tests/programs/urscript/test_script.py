@@ -111,3 +111,54 @@ def test_a_number_that_is_none_is_never_a_target(number):
 def test_hexadecimal_numbers_are_read_beside_decimal_ones():
     parsed = read("movej([1,0,0,0,0,0])\nmovej([0x2,0,0,0,0,0])\nmovej([3,0,0,0,0,0])\n")
     assert parsed.motions.q_rad[:, 0].tolist() == [1.0, 2.0, 3.0]
+
+
+ARC = "movec(p[-0.4,0.1,0.2,0,3.1,0], p[-0.5,0,0.2,0,3.1,0], a=1, v=0.1{mode})\n"
+
+
+@pytest.mark.parametrize("mode", ["", ", r=0, mode=0", ", mode=2 - 2"])
+def test_an_arc_with_the_orientation_of_its_end_is_resolved(mode):
+    assert len(read(ARC.format(mode=mode).encode()).motions) == 2
+
+
+@pytest.mark.parametrize(("mode", "word"), [("1", "mode is 1"), ("get_mode()", "which is not known")])
+def test_an_arc_along_which_the_tool_turns_is_not(mode, word):
+    script = read(ARC.format(mode=f", mode={mode}").encode())
+    assert len(script.motions) == 0
+    assert word in script.unresolved[0].why
+
+
+DRIFT = """def p():
+  movej([0,-1.6,1.7,-1.6,-1.5,0])
+  {command}
+  movel(p[-0.4,0.1,0.2,0,3.1,0], v=0.1)
+end
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "previous", "origin"),
+    [
+        ("sync()", 0, 0),
+        ("force_mode(p[0,0,0,0,0,0])", -1, 0),
+        ("speedl([0,0,0.1,0,0,0], 1, 1)", -1, 0),
+        ("stopj(2)", -1, -1),
+    ],
+)
+def test_what_pushes_the_tool_keeps_the_posture_but_not_the_place(command, previous, origin):
+    motions = read(DRIFT.format(command=command).encode()).motions
+    assert (motions.previous[1], motions.origin[1]) == (previous, origin)
+
+
+def test_where_several_motions_lead_to_a_target_all_of_them_are_known():
+    text = """def p():
+  movel([0,-1.6,1.7,-1.6,-1.5,0])
+  while get_digital_in(0):
+    movel([0,-1.5,1.7,-1.6,-1.5,0])
+    movel([0,-1.4,1.7,-1.6,-1.5,0])
+  end
+end
+"""
+    motions = read(text.encode()).motions
+    assert motions.previous.tolist() == [-1, -1, 1]
+    assert motions.possible.tolist() == [[0, 1], [2, 1]]

@@ -113,9 +113,9 @@ def test_a_time_of_zero_is_none():
 
 
 def test_an_arc_is_divided_into_arcs():
-    text = f"{START}movec({OLD}, {OLD}, a=1, v=0.1, r=0, mode=1)\n"
+    text = f"{START}movec({OLD}, {OLD}, a=1, v=0.1, r=0, mode=0)\n"
     arc = Via(1, (POSE, JOINTS), True, 0.001, 0.5)
-    added = f"movec(p[{SIX}], p[{Q}], a=1, v=0.1, r=0.001000, mode=1)\n"
+    added = f"movec(p[{SIX}], p[{Q}], a=1, v=0.1, r=0.001000, mode=0)\n"
     assert rewritten(text, vias=[arc], change=False) == START + added + text.removeprefix(START)
 
 

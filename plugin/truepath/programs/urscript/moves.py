@@ -36,11 +36,15 @@ MOVES = {
     "movec": Signature(("pose_via", "pose_to", "a", "v", "r", "mode"), (Kind.THROUGH, Kind.ARC)),
     "servoj": Signature(("q", "a", "v", "t", "lookahead_time", "gain"), (Kind.SERVO,)),
 }
-# After these nobody knows where the robot is.
+TURNING = "mode"  # of movec: anything but 0 makes the tool turn with the arc, whatever pose its end states
+# After these nobody knows where the robot is,
 LEAD_ELSEWHERE = {
-    "speedj", "speedl", "servoc", "servol", "freedrive_mode", "teach_mode", "end_teach_mode", "end_freedrive_mode",
-    "force_mode", "screw_driving", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular",
-    "stop_conveyor_tracking", "stopj", "stopl", "optimovej", "optimovel",
+    "speedj", "freedrive_mode", "teach_mode", "end_teach_mode", "end_freedrive_mode", "stopj", "optimovej", "optimovel",
+}  # fmt: skip
+# and after these not quite: the tool was pushed along or held up, in the posture that it had.
+LEAD_ASIDE = {
+    "speedl", "servoc", "servol", "force_mode", "screw_driving", "path_offset_set", "track_conveyor_linear",
+    "track_conveyor_circular", "stop_conveyor_tracking", "stopl",
 }  # fmt: skip
 
 
@@ -131,7 +135,7 @@ def literal(shape: Shape) -> Literal | None:
         return None
     signature = MOVES[name]
     given = named(signature, call)
-    if given is None or any(target not in given for target in signature.targets):
+    if given is None or any(target not in given for target in signature.targets) or TURNING in given:
         return None
     targets, poses = [], []
     for target in signature.targets:

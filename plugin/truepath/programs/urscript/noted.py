@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from truepath.programs.urscript.moves import MOVES, Literal, Move, Step, named, problem_of
+from truepath.programs.urscript.moves import MOVES, TURNING, Literal, Move, Step, named, problem_of
 from truepath.programs.urscript.syntax import Node
 from truepath.programs.urscript.tree import Statement
 from truepath.programs.urscript.values import JointsOf, Unknown, Value
@@ -40,6 +40,10 @@ def move_of(
     problem = problem_of(name, targets, tool)
     if named(signature, node) is None:
         problem = problem or f"{name}() has more arguments than it takes"
+    mode = plain(given.get(TURNING, 0))
+    if name == "movec" and mode != 0:
+        stated = "which is not known" if isinstance(mode, Unknown) else f"{mode}"
+        problem = problem or f"its mode is {stated}: the tool turns with the arc, which is not followed"
     if len(targets) == 1 and isinstance(targets[0], JointsOf) and targets[0].tool is not None:
         tool = targets[0].tool
     elsewhere = [each for each in written if isinstance(each, Written) and not each.is_part_of(node, line)]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from truepath.errors import InputError
 from truepath.programs.urscript.evaluate import built_in, evaluate, handed_on, word
-from truepath.programs.urscript.moves import LEAD_ELSEWHERE, MOVES, Move, Moves, Step
+from truepath.programs.urscript.moves import LEAD_ASIDE, LEAD_ELSEWHERE, MOVES, Move, Moves, Step
 from truepath.programs.urscript.names import (
     DEFINES,
     all_statements,
@@ -111,6 +111,8 @@ class Scene:
             self._state.tool = tool if isinstance(tool, (Pose, Unknown)) else Unknown("set_tcp() is not given a pose")
         if name in LEAD_ELSEWHERE:
             self._state.last = ANYWHERE
+        if name in LEAD_ASIDE:
+            self._state.last |= ANYWHERE
         if name in PURE:
             self._goes_on(STEPS_OF_ALGEBRA, self._statement)
         value = built_in(name, arguments, keywords)

@@ -79,6 +79,8 @@ def motions_of(
         acceleration=settings["a"],
         time_s=np.where(settings["t"] > 0, settings["t"], np.nan),  # zero: by speed and acceleration
         blend_m=np.where(kind == Kind.THROUGH, np.nan, settings["r"]),
+        rotation_vector=pose[:, 3:],
+        possible=_possible(sites, last_site),
     )
     return motions, tuple(sites)
 
@@ -102,6 +104,18 @@ def _column(
     before = {last_site.get(step, -1) for step in move.previous}
     previous = before.pop() if len(before) == 1 else -1
     return kind, line, tool, previous, last_site.get(_last_resolved(move, moves), -1), START in move.previous
+
+
+def _possible(sites: list[Site], last_site: Mapping[Step, int]) -> Array:
+    """``(P, 2)`` pairs of targets, for moves that several others lead to."""
+    pairs = [
+        (last_site[step], at)
+        for at, (move, which, _) in enumerate(sites)
+        if which == 0 and len(move.previous) > 1
+        for step in sorted(move.previous)
+        if step in last_site
+    ]
+    return np.array(pairs, int).reshape(-1, 2)
 
 
 def _last_resolved(move: Move, moves: Mapping[Step, Move]) -> Step:
