@@ -31,6 +31,9 @@ bench: $(READY) .venv-peers/.ready
 slow: $(READY)
 	$(BIN)/python workflows/coverage_study.py
 	$(BIN)/python workflows/hidden_effects.py
+	$(BIN)/python workflows/path_accuracy.py
+	$(BIN)/python workflows/fuzz_programs.py --count 5000
+	$(BIN)/pytest -m slow
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 10), "Python 3.10 or newer is needed"'

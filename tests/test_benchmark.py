@@ -12,7 +12,7 @@ from truepath.effects import EFFECTS
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "workflows" / "benchmark.py"
-QUICK = ("--rounds", "1", "--waypoints", "200", "--sample", "3", "--generations", "3")
+QUICK = ("--rounds", "1", "--waypoints", "200", "--sample", "3", "--lines", "500", "--generations", "3")
 GENERATION = {"individuals": 200, "largest": 40, "poses": 1000, "batched_s": 0.01, "torch_s": 0.25, "numpy_s": 0.05}
 
 
@@ -62,7 +62,7 @@ def test_without_peer_the_own_numbers_are_given(benchmark, data_dir, no_peers, m
     code = benchmark.main([*QUICK, *no_peers, "--json"])
     report = json.loads(capsys.readouterr().out)
     missed = [row["peer_name"] for row in report["rows"] if row["met"] is False]
-    assert set(missed) <= {"one at a time, torch", "Drake IK"}  # on the machine, and on a path of 200 waypoints
+    assert set(missed) <= {"one at a time, torch", "Drake IK", ""}  # on the machine, and on so short a path and program
     assert code == int(bool(missed))
     assert report["schema"] == "truepath.benchmark/1"
     assert "make bench" in report["skipped"][0]
@@ -89,6 +89,7 @@ def canned(benchmark, tmp_path, monkeypatch):
     corrected = {"per_waypoint_us": 2.5, "ik_per_waypoint_us": 300.0, "max_error_um": 1e-6, "ik_max_error_um": 2.0}
     run, answers = benchmark._run, {"--solve-ours": solved}
     answers["correction_benchmark.py"] = {**corrected, "waypoints": 200}
+    answers["program_benchmark.py"] = {"lines": 500, "command_s": 3.0, "parse_and_write_share": 0.4}
     answers["generation_benchmark.py"] = GENERATION
 
     def answer(command: list[str], **options) -> dict:
@@ -112,6 +113,9 @@ def test_ratios_and_requirements(benchmark, tmp_path, capsys):
     correction = rows["correction, 200 waypoints, all effects, time for each"]
     assert correction["ratio"] == pytest.approx(120.0)
     assert (correction["required"], correction["met"]) == ("ratio >= 100", True)
+    assert rows["program of 500 lines, whole command"]["truepath"] == 3.0
+    share = rows["program of 500 lines, share of reading and writing"]
+    assert (share["truepath"], share["required"], share["met"]) == (0.4, "<= 0.5", True)
     by_peer = {row["peer_name"]: row for row in report["rows"]}
     assert by_peer["one at a time, torch"]["ratio"] == pytest.approx(25.0)
     assert by_peer["one at a time, torch"]["met"] is True

@@ -11,6 +11,9 @@ Correction: a welding path of 100,000 waypoints corrected at once, with a calibr
 against Drake's InverseKinematics for a sample of the same waypoints one by one, on a plant context with the same
 calibrated frames (Drake's plant is rigid: it is spared the effects).
 
+Program: ``truepath correct`` on 100,000 lines of URScript, with collisions looked for; no peer, but reading and writing
+must not be the larger half of it (``program_benchmark.py``).
+
 Evolution: a generation of 200 networks in one go, against one network at a time (``generation_benchmark.py``).
 
 Every process but that one is held to one thread of linear algebra: on small matrices a second one only waits when the
@@ -41,6 +44,7 @@ PEER_SCRIPT = ROOT / "workflows" / "peers" / "robotkinecal_solve.py"
 URDF = ROOT / "models" / "ur5" / "ur5.urdf"
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
 SPEEDUP_REQUIRED, CORRECTION_SPEEDUP, GENERATION_SPEEDUP = 20.0, 100.0, 20.0
+LARGEST_SHARE = 0.5
 TIE_MM = 0.0005  # a thirtieth of the tracker's own error
 FOLDS = 5
 
@@ -51,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeat", type=int, default=1, help="timed solves per process and round")
     parser.add_argument("--waypoints", type=int, default=100_000)
     parser.add_argument("--sample", type=int, default=200, help="waypoints that Drake solves")
+    parser.add_argument("--lines", type=int, default=100_000, help="of the program")
     parser.add_argument("--generations", type=int, default=30, help="of the evolution, timed")
     parser.add_argument("--peers", type=Path, default=ROOT / ".venv-peers", help="virtual environment of the peers")
     parser.add_argument("--json", action="store_true", help="print JSON for machines instead of a table")
@@ -59,7 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--csv", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--train-rows", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
-    if options.rounds > FOLDS or min(options.rounds, options.repeat, options.sample, options.waypoints) < 1:
+    counts = (options.rounds, options.repeat, options.sample, options.waypoints, options.lines)
+    if options.rounds > FOLDS or min(counts) < 1:
         parser.error(f"--rounds must be 1 to {FOLDS}, the other numbers at least 1")
     if options.solve_ours:
         print(json.dumps(solve_ours(options.csv, options.train_rows, options.repeat)))
@@ -91,6 +97,10 @@ def compare(options: argparse.Namespace) -> dict[str, Any]:
     script += ["--waypoints", str(options.waypoints), "--sample", str(options.sample)]
     details["correction"] = _run(script)
     rows += _correction_rows(details["correction"])
+    _say("a long program")
+    script = [sys.executable, str(ROOT / "workflows" / "program_benchmark.py"), "--lines", str(options.lines)]
+    details["program"] = _run(script)
+    rows += _program_rows(details["program"])
     _say("a generation of the evolution")
     script = [sys.executable, str(ROOT / "workflows" / "generation_benchmark.py"), "--rounds", str(options.generations)]
     details["generation"] = _run(script, all_cores=True)
@@ -164,6 +174,15 @@ def _correction_rows(result: dict[str, Any]) -> list[dict]:
     return [
         _row(f"{what}, time for each", "us", ours, peer, theirs, required=required, met=met),
         _row(f"{what}, worst error left", "um", result["max_error_um"], peer, result["ik_max_error_um"], ratio=None),
+    ]
+
+
+def _program_rows(result: dict[str, Any]) -> list[dict]:
+    what, share = f"program of {result['lines']} lines", result["parse_and_write_share"]
+    required, met = f"<= {LARGEST_SHARE:g}", share <= LARGEST_SHARE
+    return [
+        _row(f"{what}, whole command", "s", result["command_s"], "", None),
+        _row(f"{what}, share of reading and writing", "", share, "", None, required=required, met=met),
     ]
 
 
