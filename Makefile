@@ -2,13 +2,14 @@
 # make test   set up, then lint, types and the whole test suite
 # make bench  compare with other packages (they get an environment of their own)
 # make slow   the statistical studies
+# make pictures  takes the pictures of the README anew
 
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: demo test lint format bench slow browser clean
+.PHONY: demo test lint format bench slow pictures browser clean
 
 demo: $(READY)
 	$(BIN)/truepath demo
@@ -27,6 +28,9 @@ format: $(READY)
 
 bench: $(READY) .venv-peers/.ready
 	$(BIN)/python workflows/benchmark.py
+
+pictures: $(READY) browser
+	$(BIN)/python docs/images/take.py
 
 slow: $(READY)
 	$(BIN)/python workflows/coverage_study.py

@@ -9,6 +9,7 @@ import pytest
 from command import is_refused, run
 from drake_arm import DrakeArm
 from scipy.spatial.transform import Rotation
+from truepath import plants
 from truepath.calibration import load_calibration
 from truepath.learn import learn
 from truepath.rewriting.rewrite import rewrite_program
@@ -267,3 +268,55 @@ def test_the_json_says_what_was_done(correct, weld, output):
     assert content["predicted_error_after_mm"]["max"] < 1e-6 < 0.1 < content["predicted_error_before_mm"]["mean"]
     assert content["cell"] == "ur5_cell"
     assert json.dumps(content, allow_nan=False)
+
+
+TWICE = """def pick():
+  movel(p[0.093022, -0.359454, 0.019153, -0.171982, 1.690211, 1.801271])
+end
+def prog():
+  set_tcp(p[0, 0, 0, 0, 0, 0])
+  movej([1.470356, -0.960435, 1.998879, -0.874187, -1.332254, -0.584063])
+  pick()
+  movej({second})
+  pick()
+end
+prog()
+"""
+SAME_POSTURE = "[1.470356, -0.960435, 1.998879, -0.874187, -1.332254, -0.584063]"
+OTHER_POSTURE = "[-1.170948, 1.797779, 1.997534, -0.868668, -2.301174, 2.452038]"
+
+
+def test_a_pose_that_is_reached_in_two_postures_is_not_corrected_for_one_of_them(correct):
+    """One correction cannot be right for both: in the other posture the real robot errs otherwise."""
+    same = correct(TWICE.format(second=SAME_POSTURE), "--cell", "none", "--json").json()
+    other = correct(TWICE.format(second=OTHER_POSTURE), "--cell", "none", "--json").json()
+    assert same["unresolved"] == []
+    assert [each["line"] for each in other["unresolved"]] == [2]
+
+
+def test_what_follows_a_posture_that_cannot_be_told_cannot_be_told_either(correct, poses):
+    text = f"def p():\n  movel({poses[0]})\n  movel({poses[1]})\n  movej({HOME})\n  movel({poses[1]})\nend\n"
+    content = correct(text, "--tcp", "0,0,120,0,0,0", "--json").json()
+    assert [each["line"] for each in content["unresolved"]] == [2, 3]
+
+
+def test_poses_without_a_tool_are_a_warning(correct, poses):
+    text = f"def p():\n  movej({HOME})\n  movel({poses[0]})\nend\n"
+    guards = [each["guard"] for each in correct(text, "--cell", "none", "--json").json()["findings"]]
+    assert "tool" in guards
+    guards = [
+        each["guard"] for each in correct(text, "--cell", "none", "--tcp", "0,0,120,0,0,0", "--json").json()["findings"]
+    ]
+    assert "tool" not in guards
+
+
+def test_a_path_of_poses_starts_from_the_stated_posture(correct, tmp_path):
+    text = (plants.models_dir() / "ur5" / "pose_path.csv").read_text()
+    options = ("--cell", "none", "--json", "--as", "poses")
+    assert [each["guard"] for each in correct(text, *options, name="a.csv").json()["findings"]] == ["posture"]
+    assert correct(text, *options, "--start-deg", "0,-90,90,-90,-90,0", name="a.csv").json()["findings"] == []
+
+
+def test_a_path_of_joints_has_no_place_for_poses(correct):
+    text = (plants.models_dir() / "ur5" / "weld_path.csv").read_text()
+    assert is_refused(correct(text, "--as", "poses", name="a.csv"), "no columns for poses")

@@ -1,81 +1,42 @@
 """What the README tells people to paste works, in that order, from a folder that looks like a checkout."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from pasted import ROOT, blocks_of, make_checkout, paste, require_promised
 
-ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DATA = "../shared/data"
-STEP_TIMEOUT_S = 240
-NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]\d+)?")
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+    return [block.text for block in blocks_of(README) if block.language == language]
 
 
 def steps(on_real_data: bool) -> list[tuple[str, str]]:
     """Commands to paste and what the README says that they print, if anything."""
-    found = re.findall(r"^```bash\n(.*?)^```\n(?:\n```text\n(.*?)^```$)?", README, flags=re.MULTILINE | re.DOTALL)
-    return [(pasted, promised) for pasted, promised in found if (DATA in pasted) == on_real_data]
+    found, every = [], blocks_of(README)
+    for block, then in zip(every, [*every[1:], None], strict=True):
+        if block.language == "bash" and (DATA in block.text) == on_real_data:
+            promised = then.text if then is not None and then.language == "text" and then.follows else ""
+            found.append((block.text, promised))
+    return found
 
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory) -> Path:
-    """A folder with the models and the environment of the repository, and nothing of what the commands write."""
-    folder = tmp_path_factory.mktemp("readme") / "main"
-    folder.mkdir()
-    (folder / "models").symlink_to(ROOT / "models")
-    (folder / ".venv").symlink_to(sys.prefix)
-    return folder
-
-
-def paste(text: str, folder: Path) -> str:
-    env = {**os.environ, "COLUMNS": "140"}  # tables as wide as they like
-    done = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", text],
-        cwd=folder,
-        env=env,
-        capture_output=True,
-        text=True,
-        timeout=STEP_TIMEOUT_S,
-        check=False,
-    )
-    assert done.returncode == 0, f"{text}\nexit code {done.returncode}\n{done.stdout}\n{done.stderr}"
-    for written in re.findall(r"(?:-o|>) (out/\S+)", text):
-        assert (folder / written).stat().st_size > 0, f"{written} is empty"
-    return done.stdout
-
-
-def require_promised(promised: str, printed: str) -> None:
-    """Every line with a number in the README was printed, with nearly these numbers."""
-
-    def words(line: str) -> str:
-        return " ".join(NUMBER.sub("#", line).split())
-
-    for line in promised.splitlines():
-        if not NUMBER.search(line):
-            continue
-        alike = [other for other in printed.splitlines() if words(other) == words(line)]
-        assert alike, f"the README promises\n{line}\nbut this was printed\n{printed}"
-        expected = [float(number) for number in NUMBER.findall(line)]
-        close = [pytest.approx(expected, rel=0.1, abs=0.003) == list(map(float, NUMBER.findall(k))) for k in alike]
-        assert any(close), f"the README promises\n{line}\nbut this was printed\n" + "\n".join(alike)
+    return make_checkout(tmp_path_factory.mktemp("readme") / "main")
 
 
 def test_every_block_is_one_that_these_tests_know():
+    assert {block.language for block in blocks_of(README)} <= {"bash", "text", "python"}
     for block in blocks("bash"):
         for line in block.splitlines():
             assert line.startswith((".venv/bin/truepath ", "awk ", "mkdir -p out")), line
     assert len(steps(on_real_data=False)) >= 5
     assert len(steps(on_real_data=True)) >= 2
     assert sum(bool(promised) for real in (False, True) for _, promised in steps(real)) == len(blocks("text"))
-    assert README.count("```") == 2 * len(re.findall(r"^```\w+$", README, flags=re.MULTILINE))
 
 
 def test_the_tour_on_the_virtual_cell_and_the_python_example(checkout):

@@ -35,7 +35,6 @@ HIDDEN, POSES, NOISE_MM = ("joint_compliance",), 100, 0.02
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _options(arguments)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # whoever stops it does so as Ctrl-C does
     try:
         operate(options)
     except TruepathError as error:
@@ -48,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def operate(options: argparse.Namespace) -> None:
     """Sets the host up, loads the plugin and shows the program until the time is over or somebody interrupts."""
+    if not Path(options.program).is_file():  # before anybody waits for a calibration
+        raise InputError("there is no such program", file=options.program)
     say = print if options.verbose else lambda text: None
     meshcat = start_meshcat(options.host, options.port)
     where = "this machine only" if options.host in ("localhost", "127.0.0.1") else f"whoever reaches {options.host}"
@@ -186,4 +187,5 @@ def _port(text: str) -> int:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     sys.exit(main())

@@ -92,28 +92,27 @@ def preview(
     """Show a path as programmed, as the real robot would go, and as corrected: one HTML page."""
     from truepath import console, console_programs
     from truepath.calibration import load_calibration
+    from truepath.controller import controller_of
     from truepath.pipeline import keep
-    from truepath.preview import write_preview
+    from truepath.preview import write_program_preview
+    from truepath.rewriting.open import SCRIPTS
     from truepath.rewriting.rewrite import rewrite_program
     from truepath.rewriting.stated import stated_options
-    from truepath.rewriting.watch import along_the_program
 
     keep(output, path, calibration)
     with console.progress("drawing") as say:
         loaded = load_calibration(calibration).carrying(payload_kg)
         options = stated_options(loaded, None, controller_kinematics, None, max_correction_mm, "none", start_deg, tcp)
         rewritten = rewrite_program(path, loaded, options, say=say)
-        if not len(rewritten.plan):
-            raise InputError("there is nothing to show", file=path, expected="targets that can be resolved")
-        along = along_the_program(rewritten.plan, rewritten.correction.q_rad, rewritten.ways)
-        write_preview(
+        write_program_preview(
             output,
             loaded,
-            along.q_today_rad,
-            along.q_corrected_rad,
+            rewritten,
+            controller_of(loaded.model.robot, controller_kinematics),
             robot_source=robot or loaded.robot.source,
             magnification=magnification,
             title=path.name,
+            text=path.read_text("utf-8", "replace") if path.suffix.lower() in SCRIPTS else None,
         )
     console_programs.print_rewritten(rewritten)
     console.out.print(f"open {output} in a browser")

@@ -149,13 +149,21 @@ def _solve(model: CalibratedModel, q_rad: Array, line: Array, file: str) -> Corr
     if not (ok.all() and (changes < MAX_JOINT_CORRECTION_RAD).all()):
         change = changes.max(axis=1)
         k = int(np.argmin(ok & (change < MAX_JOINT_CORRECTION_RAD)))
+        where = f"distance to singularity {solution.smallest_singular_value[k]:.3g}"
+        if ok[k]:
+            raise CorrectionError(
+                "the correction leaves the posture",
+                file=file,
+                line=int(line[k]),
+                expected=f"no joint moving by {np.degrees(MAX_JOINT_CORRECTION_RAD):.1f} deg or more",
+                found=f"{np.degrees(change[k]):.2f} deg; {where}",
+            )
         raise CorrectionError(
-            "no correction was found near the programmed joints" if not ok[k] else "the correction leaves the posture",
+            "no correction was found near the programmed joints",
             file=file,
             line=int(line[k]),
-            expected=f"all within 1 um and 1 urad, no joint moving by {np.degrees(MAX_JOINT_CORRECTION_RAD):.1f} deg",
-            found=f"{1e6 * solution.position_error_m[k]:.3g} um, {1e6 * solution.angle_error_rad[k]:.3g} urad, "
-            f"{np.degrees(change[k]):.2f} deg; distance to singularity {solution.smallest_singular_value[k]:.3g}",
+            expected="the tool within 1 um and 1 urad of where it should be",
+            found=f"{1e6 * solution.position_error_m[k]:.3g} um, {1e6 * solution.angle_error_rad[k]:.3g} urad; {where}",
         )
     return solution
 

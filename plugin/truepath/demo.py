@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from truepath import plants
+from truepath.controller import controller_of
 from truepath.diagnose import diagnose
 from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.lie import Array
 from truepath.model import nominal_flange_poses
 from truepath.pipeline import write_diagnosis
-from truepath.preview import write_preview
+from truepath.preview import write_program_preview
 from truepath.readers import read_measurements, with_nominal_frames
 from truepath.rewriting.rewrite import rewrite_program
 from truepath.validate import Validation, validate
@@ -88,11 +89,11 @@ def run_demo(folder: Path, seed: int, say: Callable[[str], None]) -> DemoResult:
 
     say("the preview is drawn")
     preview = folder / "preview.html"
-    write_preview(
+    write_program_preview(
         preview,
         calibration,
-        corrected.plan.q_rad,
-        corrected.correction.q_rad,
+        corrected,
+        controller_of(calibration.model.robot),
         robot_source=CELL,
         title="weld_path.csv on the virtual UR5",
     )

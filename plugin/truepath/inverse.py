@@ -79,23 +79,34 @@ def _within_tolerance(error: Array) -> Array:
     return (angle < ANGLE_TOLERANCE_RAD) & (position < POSITION_TOLERANCE_M)
 
 
-def joints_along_path(robot: NominalRobot, X_BF: Array, prefer: Region, line: Array, file: str) -> Array:
+def joints_along_path(
+    robot: NominalRobot, X_BF: Array, prefer: Region, line: Array, file: str, q_start: Array | None = None
+) -> Array:
     """Nominal joints ``(N, n)`` for a path of flange poses ``(N, 4, 4)``, all on one arm branch.
 
     The postures that reach the first waypoint are tried in turn, the one nearest to the joints that
     ``prefer`` is about first, until the whole path can be followed. A joint that would run into its limit
-    starts a whole turn away from it if that gives it the room.
+    starts a whole turn away from it if that gives it the room. If ``q_start`` ``(n,)`` is given, the posture nearest
+    to it is the only one.
 
     Raises:
         CorrectionError: a waypoint out of reach or beyond a limit, or the path leaves every branch; with its line.
     """
     failures: list[CorrectionError] = []
-    for q_first in _postures(robot, X_BF[0], prefer, int(line[0]), file):
+    postures = _postures(robot, X_BF[0], prefer, int(line[0]), file)
+    if q_start is not None:
+        postures = postures[[int(np.argmin(np.linalg.norm(lie_in_turns(postures - q_start), axis=1)))]]
+    for q_first in postures:
         try:
             return _within_limits(robot, _follow(robot, X_BF, q_first, line, file), line, file)
         except CorrectionError as error:
             failures.append(error)
     raise max(failures, key=lambda error: error.line or 0)
+
+
+def lie_in_turns(angles: Array) -> Array:
+    """The same angles, rad, between half a turn below and above zero."""
+    return angles - 2 * np.pi * np.round(angles / (2 * np.pi))
 
 
 def _follow(robot: NominalRobot, X_BF: Array, q_first: Array, line: Array, file: str) -> Array:

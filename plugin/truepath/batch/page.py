@@ -14,6 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.ticker import MaxNLocator
 
+from truepath.look import stylesheet
 from truepath.report.canvas import AFTER, BEFORE, PALE, new_axes, write_svg
 
 SIGNS = {"corrected": "✓", "unchanged": "=", "partial": "◐", "refused": "✕", "failed": "!", "pending": "…"}
@@ -45,7 +46,7 @@ def render(summary: dict[str, Any]) -> str:
     programs = summary["programs"]
     return environment.from_string(_own("page.html.jinja")).render(
         policy=policy,
-        css=Markup(_own("page.css")),
+        css=Markup(stylesheet() + _own("page.css")),
         script=Markup(script),
         summary=summary,
         totals=summary["totals"],

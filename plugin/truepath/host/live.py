@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from truepath.host.course import Course
+from truepath.host.lines_drawn import draw_line
 from truepath.host.placed_robot import PlacedRobot
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
-from truepath.preview.scene import CORRECTED, PROGRAMMED, UNCORRECTED
-from truepath.preview.toolpaths import fine_positions, interpolate
+from truepath.preview.colours import CORRECTED, PROGRAMMED, UNCORRECTED, unit_rgb
+from truepath.preview.shown import ShownPath
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
 PREFIX = "/truepath"
-LINE_WIDTH, POINT_SIZE_M = 3.0, 0.01
+LINE_RADIUS_M, POINT_RADIUS_M = 0.002, 0.006
 
 
 @dataclass(frozen=True)
@@ -39,41 +39,28 @@ class PathsShown:
     corrected_mm: ErrorStatistics
 
 
-def show_paths(
-    meshcat: Meshcat, robot: PlacedRobot, q_programmed: Array, q_corrected: Array, magnification: float
-) -> PathsShown:
-    """Draws three lines below ``/truepath``: ``programmed``, ``real``, ``corrected``; earlier ones go.
-
-    Args:
-        q_programmed, q_corrected: ``(N, n)``; in between the joints are taken to move linearly.
-    """
-    errors = [
-        ErrorStatistics.of(1e3 * np.linalg.norm((poses - robot.programmed_tool_poses(q_programmed))[:, :3, 3], axis=1))
-        for poses in (robot.tool_poses(q_programmed), robot.tool_poses(q_corrected))
-    ]
-    at = fine_positions(q_programmed)
-    programmed = interpolate(q_programmed, at)
-    meant = robot.programmed_tool_poses(programmed)[:, :3, 3]
-    real, corrected = (robot.tool_poses(q)[:, :3, 3] for q in (programmed, interpolate(q_corrected, at)))
-    real, corrected = (meant + magnification * (points - meant) for points in (real, corrected))
+def show_paths(meshcat: Meshcat, robot: PlacedRobot, shown: ShownPath, magnification: float) -> PathsShown:
+    """Draws three lines below ``/truepath``: ``programmed``, ``real``, ``corrected``; earlier ones go."""
+    course = Course.of(robot, shown)
+    at = course.fine.waypoint
+    real, corrected = (course.drawn(points, magnification) for points in (course.real, course.corrected))
     for name, points, colour in (
-        ("programmed", meant, PROGRAMMED),
+        ("programmed", course.meant, PROGRAMMED),
         ("real", real, UNCORRECTED),
         ("corrected", corrected, CORRECTED),
     ):
-        _draw(meshcat, f"{PREFIX}/{name}", points, colour)
-    return PathsShown(meant, real, corrected, magnification, *errors)
+        _draw(meshcat, f"{PREFIX}/{name}", points, colour, course.fine.piece)
+    errors = (ErrorStatistics.of(errors[at]) for errors in (course.real_mm, course.corrected_mm))
+    return PathsShown(course.meant, real, corrected, magnification, *errors)
 
 
-def _draw(meshcat: Meshcat, path: str, points: Array, colour: str) -> None:
-    from pydrake.geometry import Rgba
-
-    rgba = Rgba(*(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 1.0)
-    if len(points) > 1:
-        meshcat.SetLine(path, np.ascontiguousarray(points.T), LINE_WIDTH, rgba)
+def _draw(meshcat: Meshcat, path: str, points: Array, colour: str, piece: Array) -> None:
+    meshcat.Delete(path)
+    if draw_line(meshcat, path, points, LINE_RADIUS_M, unit_rgb(colour), piece):
         return
-    from pydrake.perception import BaseField, Fields, PointCloud
+    from pydrake.geometry import Rgba, Sphere
+    from pydrake.math import RigidTransform
 
-    cloud = PointCloud(1, Fields(BaseField.kXYZs))
-    cloud.mutable_xyzs()[:] = points.T
-    meshcat.SetObject(path, cloud, POINT_SIZE_M, rgba)
+    centre = f"{path}/point"
+    meshcat.SetObject(centre, Sphere(POINT_RADIUS_M), Rgba(*unit_rgb(colour), 1.0))
+    meshcat.SetTransform(centre, RigidTransform(points[0]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -16,12 +17,13 @@ from truepath.host.placed_robot import PlacedRobot
 from truepath.lie import Array
 
 if TYPE_CHECKING:
-    from pydrake.geometry import Meshcat
+    from pydrake.geometry import Meshcat, SceneGraph
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import Frame, ModelInstanceIndex
     from pydrake.systems.framework import Context
     from pydrake.trajectories import Trajectory
 
+    from truepath.host.controls import Controls
     from truepath.host.live import PathsShown
     from truepath.preview import PreviewSummary
     from truepath.rewriting.options import RewriteOptions
@@ -204,41 +206,72 @@ class CalibrationPlugin(Calibrating):
             InputError: neither a Meshcat nor a page; a page without the shapes; as ``correct`` and ``write_preview``.
         """
         calibration = self._in_use()
-        q_programmed, q_corrected = self._path(program, corrected)
+        from truepath.host.course import shown_path
+
+        shown = shown_path(self, program, corrected)
         if output is None:
-            if self.meshcat is None:
-                raise InputError("there is nothing to draw in", expected="a meshcat given to the plugin, or an output")
             from truepath.host.live import show_paths
 
-            return show_paths(self.meshcat, PlacedRobot.of(self), q_programmed, q_corrected, magnification)
+            return show_paths(self._meshcat(), PlacedRobot.of(self), shown, magnification)
         if robot_source is None:
             raise InputError("a page needs the shapes of the arm", expected="robot_source: a built-in name or a URDF")
         from truepath.preview import write_preview
 
         return write_preview(
-            output, calibration, q_programmed, q_corrected, robot_source=robot_source, magnification=magnification
+            output,
+            calibration,
+            shown.q_meant,
+            shown.q_corrected,
+            robot_source=robot_source,
+            magnification=magnification,
         )
 
-    def _path(self, program: Any, corrected: Array | None) -> tuple[Array, Array]:
-        """Programmed and corrected joints ``(N, n)`` that can be drawn."""
-        if _is_trajectory(program):
-            moved = self.correct(program)
-            return program.vector_values(moved.time_s).T, moved.trajectory.vector_values(moved.time_s).T
-        if isinstance(program, (str, Path)):
-            from truepath.rewriting.watch import along_the_program
+    def operate(
+        self,
+        program: str | Path | Array | Trajectory,
+        corrected: Array | None = None,
+        *,
+        scene_graph: SceneGraph | None = None,
+        magnification: float = 50.0,
+        options: RewriteOptions | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> Controls:
+        """Draws what ``preview`` draws and the arm twice, today as a ghost and corrected, and adds controls for it.
 
-            done = self.correct(program)
-            if not len(done.plan):
-                raise InputError("there is nothing to show", file=program, expected="targets that can be resolved")
-            along = along_the_program(done.plan, done.correction.q_rad, done.ways)
-            return along.q_today_rad, along.q_corrected_rad
-        q = np.atleast_2d(np.asarray(program, float))
-        if corrected is None:
-            return q, self.correct(q).q_rad
-        corrected = np.atleast_2d(np.asarray(corrected, float))
-        if corrected.shape != q.shape:
-            raise InputError("programmed and corrected path differ", expected=str(q.shape), found=str(corrected.shape))
-        return q, corrected
+        In the host's Meshcat an operator then scrubs along the path, plays it, changes the magnification, shows and
+        hides, colours by error and steps through warnings. Nothing happens by itself: the host calls ``poll`` of what
+        is returned in a loop of its own, or ``run``.
+
+        Args:
+            program, corrected: as ``preview``.
+            scene_graph: with which the plant is registered, for the shapes of the arm; None: lines and text only.
+            magnification: factor by which errors are drawn, at the start.
+            options: if the program is a file: see ``RewriteOptions``.
+            say: is told each warning that the operator steps to.
+
+        Raises:
+            InputError: no Meshcat, no calibration, a program that cannot be shown, a magnification below 1.
+            CorrectionError: a guard forbids the correction.
+        """
+        meshcat = self._meshcat()
+        if not 1.0 <= magnification < np.inf:
+            raise InputError("errors cannot be drawn at this scale", expected="1 or more", found=str(magnification))
+        from truepath.host.controls import Controls
+        from truepath.host.course import Course, shown_path
+        from truepath.host.live_view import LiveView
+
+        robot = PlacedRobot.of(self)
+        course = Course.of(robot, shown_path(self, program, corrected, options))
+        name = Path(program).name if isinstance(program, (str, Path)) else "path"
+        title = f"{name} on {self.robot.name}"
+        view = LiveView(meshcat, robot, course, scene_graph=scene_graph, magnification=magnification, title=title)
+        view.look()
+        return Controls(view, say)
+
+    def _meshcat(self) -> Meshcat:
+        if self.meshcat is None:
+            raise InputError("there is nothing to draw in", expected="a meshcat given to the plugin, or an output")
+        return self.meshcat
 
 
 def _is_trajectory(program: Any) -> bool:

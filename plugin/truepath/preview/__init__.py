@@ -1,7 +1,7 @@
 """The preview: one HTML page that shows what a correction does, for people. It opens anywhere, without a network.
 
-``toolpaths`` computes what is to be seen, ``arm`` reads the robot's shapes, ``scene`` says it in the
-language of meshcat, ``page`` wraps it up. No server is started and nothing of Drake is needed.
+``shown`` says of what, ``toolpaths`` and ``keyframes`` compute what is to be seen, ``arm`` reads the robot's shapes,
+``scene`` says it in the language of meshcat, ``page`` wraps it up. No server is started and nothing of Drake is needed.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -20,11 +20,21 @@ from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
 from truepath.networks_along import NetworksAlong
 from truepath.preview.arm import read_arm
+from truepath.preview.colours import scale_end_mm
+from truepath.preview.covered import covered_surface
+from truepath.preview.keyframes import animate
 from truepath.preview.page import PageText, render
-from truepath.preview.scene import record_scene
-from truepath.preview.toolpaths import Toolpaths, animate, nice_magnification
+from truepath.preview.scene import Drawing, record_scene
+from truepath.preview.shown import ShownPath
+from truepath.preview.toolpaths import FinePaths, nice_magnification
 
-__all__ = ["PreviewSummary", "write_preview"]
+if TYPE_CHECKING:
+    from truepath.controller import Controller
+    from truepath.rewriting.rewrite import RewrittenProgram
+
+__all__ = ["PreviewSummary", "write_preview", "write_program_preview"]
+
+Magnification = float | Literal["auto"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,7 @@ class PreviewSummary:
         key_frames: of the animation; 1 where nothing moves.
         missing_meshes: files that the robot model names and that could not be read; they are not drawn.
         networks: what they say at the waypoints; None where the calibration has none.
+        remarks: how many things there are to look at.
     """
 
     output: Path
@@ -51,6 +62,7 @@ class PreviewSummary:
     key_frames: int
     missing_meshes: tuple[str, ...]
     networks: NetworksAlong | None = None
+    remarks: int = 0
 
 
 def write_preview(
@@ -60,7 +72,7 @@ def write_preview(
     q_corrected: Array,
     *,
     robot_source: str | Path,
-    magnification: float | Literal["auto"] = 50.0,
+    magnification: Magnification = 50.0,
     title: str = "Path preview",
     labels: Sequence[str] | None = None,
 ) -> PreviewSummary:
@@ -80,48 +92,97 @@ def write_preview(
         InputError: joints, labels or magnification that make no sense, a model that cannot be read or that
             is not that of the calibration, or a page that cannot be written.
     """
-    output = Path(output)
-    robot = calibration.model.robot
     q_programmed, q_corrected = np.asarray(q_programmed, float), np.asarray(q_corrected, float)
-    _require_joints(q_programmed, q_corrected, robot.num_joints)
+    _require_joints(q_programmed, q_corrected, calibration.model.robot.num_joints)
     if labels is not None and len(labels) != len(q_programmed):
         raise InputError(
             "labels and waypoints differ in number", expected=str(len(q_programmed)), found=str(len(labels))
         )
-    arm = read_arm(robot_source, robot, calibration.robot.name)
+    shown = ShownPath.of_joints(q_programmed, q_corrected, labels)
+    return _write(Path(output), calibration, shown, robot_source, magnification, title)
 
-    outside = np.logical_not(calibration.region.region().contains(q_programmed))
-    model = calibration.model
-    networks = None if model.residual is None else NetworksAlong.of(model.residual, q_corrected)
-    paths = Toolpaths.of(model, q_programmed, q_corrected)
-    uncorrected, corrected = (ErrorStatistics.of(errors) for errors in paths.errors_mm())
-    factor = nice_magnification(paths) if magnification == "auto" else _require_magnification(magnification)
-    frames = animate(model, q_programmed, q_corrected, factor)
-    recorded = record_scene(arm, model, q_programmed, q_corrected, outside, frames, factor)
+
+def write_program_preview(
+    output: str | Path,
+    calibration: Calibration,
+    rewritten: RewrittenProgram,
+    controller: Controller,
+    *,
+    robot_source: str | Path,
+    magnification: Magnification = 50.0,
+    title: str = "Path preview",
+    text: str | None = None,
+) -> PreviewSummary:
+    """The same for a corrected program: with its lines, its tool, and what the guards say.
+
+    Args:
+        rewritten: the program; targets that cannot be resolved are not shown.
+        controller: of the robot, as it was rewritten for.
+        text: of the program as it was, whose lines are shown along with the waypoints; None: only their numbers.
+
+    Raises:
+        InputError: there is no target, or as ``write_preview``.
+    """
+    if not len(rewritten.plan):
+        raise InputError("there is nothing to show", file=rewritten.file, expected="targets that can be resolved")
+    shown = ShownPath.of_program(rewritten, controller, text)
+    return _write(Path(output), calibration, shown, robot_source, magnification, title)
+
+
+def _write(
+    output: Path,
+    calibration: Calibration,
+    shown: ShownPath,
+    robot_source: str | Path,
+    magnification: Magnification,
+    title: str,
+) -> PreviewSummary:
+    model, region = calibration.model, calibration.region.region()
+    arm = read_arm(robot_source, model.robot, calibration.robot.name)
+    outside = shown.outside(region)
+    networks = None
+    if model.residual is not None:
+        networks = NetworksAlong.of(model.residual, shown.q_corrected[shown.waypoint])
+    fine = FinePaths.of(model, shown, outside)
+    at_waypoints = fine.paths.at(fine.waypoint)
+    errors = at_waypoints.errors_mm()
+    uncorrected, corrected = (ErrorStatistics.of(each) for each in errors)
+    factor = nice_magnification(at_waypoints) if magnification == "auto" else _require_magnification(magnification)
+    p_FT = (model.X_FE if shown.X_FT is None else shown.X_FT)[:3, 3]
+    frames = animate(model, fine, p_FT, factor)
+    covered = covered_surface(region, model.robot)
+    scale_mm = scale_end_mm(fine.paths.errors_mm()[0])
+    recorded = record_scene(Drawing(arm, model, fine, frames, p_FT, factor, scale_mm, covered))
+    remarks = (*shown.remarks, *shown.stretches_outside(region))
     text = PageText(
         title=title,
         robot=calibration.robot.name,
         calibrated_utc=calibration.created_utc,
-        waypoints=len(q_programmed),
-        outside=int(outside.sum()),
+        waypoints=len(shown.waypoint),
+        outside=int(outside[shown.waypoint].sum()),
         magnification=factor,
+        scale_mm=scale_mm,
+        own_tool=shown.X_FT is not None,
         uncorrected=uncorrected,
         corrected=corrected,
         model_error=None if calibration.heldout is None else calibration.heldout.calibrated.position_mm,
         missing_meshes=arm.missing_meshes,
         networks=networks,
+        remarks=remarks,
+        has_region=covered is not None,
     )
-    write_atomically(output, render(text, recorded, frames, labels))
+    write_atomically(output, render(text, shown, recorded, frames))
     return PreviewSummary(
         output=output,
-        waypoints=len(q_programmed),
-        outside_region=int(outside.sum()),
+        waypoints=text.waypoints,
+        outside_region=text.outside,
         uncorrected_mm=uncorrected,
         corrected_mm=corrected,
         magnification=factor,
         key_frames=len(frames.time_s),
         missing_meshes=arm.missing_meshes,
         networks=networks,
+        remarks=len(remarks),
     )
 
 

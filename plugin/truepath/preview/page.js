@@ -1,116 +1,118 @@
-"use strict";
-// Feeds the recorded scene to meshcat's viewer, points the camera, and runs the panel.
-(() => {
-  const FIELD_OF_VIEW_DEG = 32;
-  const VIEW_MARGIN = 1.06;
-  const data = JSON.parse(document.getElementById("scene-data").textContent);
-  const element = (id) => document.getElementById(id);
+// Feeds the recorded scene to meshcat's viewer and connects what can be pressed.
+const element = (id) => document.getElementById(id);
+const ARRAYS = { f4: Float32Array, u4: Uint32Array };
 
+function bytesOf(text) {
+  const binary = atob(text);
+  const bytes = new Uint8Array(binary.length);
+  for (let k = 0; k < binary.length; k += 1) bytes[k] = binary.charCodeAt(k);
+  return bytes;
+}
+
+function revived(key, value) {
+  return value && value.binary ? new ARRAYS[value.binary](bytesOf(value.base64).buffer) : value;
+}
+
+function start() {
+  const data = JSON.parse(element("scene-data").textContent, revived);
   let viewer;
   try {
     viewer = new MeshCat.Viewer(element("meshcat-pane"));
   } catch (error) {
     element("no-webgl").hidden = false;
-    element("playback").hidden = true;
+    element("playback").dataset.still = "";
+    element("stage").hidden = true;
     return;
   }
-  const bytes = data.chunks.map((text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
+  viewer.renderer.shadowMap.enabled = false; // hardly to be seen here, and a third of the work of a frame
+  const chunks = data.chunks.map(bytesOf);
   for (const parts of data.commands) {
-    const command = new Uint8Array(parts.reduce((length, k) => length + bytes[k].length, 0));
+    const command = new Uint8Array(parts.reduce((length, k) => length + chunks[k].length, 0));
     let offset = 0;
     for (const k of parts) {
-      command.set(bytes[k], offset);
-      offset += bytes[k].length;
+      command.set(chunks[k], offset);
+      offset += chunks[k].length;
     }
     viewer.handle_command_bytearray(command);
   }
+  const camera = makeCamera(viewer, element("meshcat-pane"), data.views);
+  for (const when of ["load", "resize"]) window.addEventListener(when, camera.place);
+  new ResizeObserver(camera.place).observe(element("meshcat-pane"));
+  for (const button of document.querySelectorAll("#views button")) {
+    button.addEventListener("click", () => camera.look(button.dataset.view));
+  }
+  connectLayers(viewer, data, camera);
+  connectPlayback(viewer, data);
+  connectPrinter(viewer);
+  camera.place();
+  viewer.render();
+  document.body.dataset.ready = "";
+}
 
-  // Camera. The viewer's space has y up, the scene z; the panel's width is taken from the picture.
-  const camera = viewer.camera;
-  const { Vector3 } = MeshCat.THREE;
-  const upright = ([x, y, z]) => new Vector3(x, z, -y);
-  const points = data.view.points.map(upright);
-  const direction = upright(data.view.direction).normalize();
-  let moved = false;
-  viewer.controls.addEventListener("start", () => { moved = true; });
-
-  function place() {
-    const [width, height] = [window.innerWidth, window.innerHeight];
-    const covered = width > 760 ? element("panel").getBoundingClientRect().right : 0;
-    viewer.set_3d_pane_size(width, height);
-    camera.fov = FIELD_OF_VIEW_DEG;
-    camera.setViewOffset(width, height, -covered / 2, 0, width, height);
-    if (!moved) {
-      fit((width - covered) / height);
-    }
+function connectLayers(viewer, data, camera) {
+  const show = (path, visible) => {
+    viewer.scene_tree.find([data.root, ...path]).set_property("visible", visible);
     viewer.set_dirty();
+  };
+  for (const box of document.querySelectorAll(".layers input[data-nodes]")) {
+    const apply = () => {
+      show([box.dataset.nodes], box.checked);
+      if (box.dataset.nodes === data.region) camera.include(box.checked);
+    };
+    box.addEventListener("change", apply);
+    apply();
   }
+  const byError = element("by-error");
+  const colour = () => {
+    document.body.classList.toggle("by-error", byError.checked);
+    for (const name of data.two_looks) {
+      show([name, "by_error"], byError.checked);
+      show([name, "plain"], !byError.checked);
+    }
+  };
+  byError.addEventListener("change", colour);
+  colour();
+}
 
-  function fit(aspect) {
-    const right = new Vector3(0, 1, 0).cross(direction).normalize();
-    const up = direction.clone().cross(right);
-    const seen = points.map((p) => [p.dot(right), p.dot(up), p.dot(direction)]);
-    const tangent = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360) / VIEW_MARGIN;
-    const slopes = [tangent * aspect, tangent];
-    // Along each of right and up: the eye must be so far that the outermost points fit on both sides.
-    const reach = slopes.map((slope, axis) => [
-      Math.max(...seen.map((p) => p[axis] + slope * p[2])),
-      Math.max(...seen.map((p) => -p[axis] + slope * p[2])),
-    ]);
-    const eye = reach.map(([a, b]) => (a - b) / 2);
-    const depth = Math.max(...reach.map(([a, b], axis) => (a + b) / 2 / slopes[axis]));
-    const middle = seen.reduce((sum, p) => sum + p[2], 0) / seen.length;
-    const at = (z) => right.clone().multiplyScalar(eye[0]).addScaledVector(up, eye[1]).addScaledVector(direction, z);
-    camera.position.copy(at(depth));
-    viewer.controls.target.copy(at(middle));
-    viewer.controls.update();
-  }
-
-  window.addEventListener("load", place);
-  window.addEventListener("resize", place);
-  requestAnimationFrame(place);
-
-  // Legend: what is ticked is shown.
-  for (const box of document.querySelectorAll(".legend input")) {
-    box.addEventListener("change", () => {
-      for (const name of box.dataset.nodes.split(" ")) {
-        viewer.scene_tree.find([data.root, name]).set_property("visible", box.checked);
-      }
-      viewer.set_dirty();
+function connectPlayback(viewer, data) {
+  const [play, scrubber, place, statement] = ["play", "scrubber", "place", "statement"].map(element);
+  const millimetres = (value) => `${value.toFixed(2)} mm`;
+  const count = data.waypoints.length;
+  const playback = makePlayback(viewer, data, (now) => {
+    const next = Math.ceil(now.waypoint - 1e-3); // the statement at which the robot works
+    scrubber.value = now.waypoint + 1;
+    play.textContent = now.playing ? "Pause" : "Play";
+    const line = data.lines ? ` · line ${data.lines[next]}` : "";
+    place.textContent = `Waypoint ${next + 1} of ${count}${line}`;
+    statement.textContent = data.labels[next] || "";
+    statement.hidden = !statement.textContent;
+    element("error-here").textContent =
+      `Error ${millimetres(now.uncorrected_mm)} → ${millimetres(now.corrected_mm)}`;
+  });
+  const goTo = playback.goToWaypoint;
+  play.addEventListener("click", () => playback.play(!playback.isPlaying()));
+  scrubber.addEventListener("input", () => goTo(Number(scrubber.value) - 1));
+  element("before").addEventListener("click", () => goTo(Math.ceil(playback.waypoint() - 1e-3) - 1));
+  element("next").addEventListener("click", () => goTo(Math.floor(playback.waypoint() + 1e-3) + 1));
+  for (const button of document.querySelectorAll("[data-waypoint]")) {
+    button.addEventListener("click", () => {
+      goTo(Number(button.dataset.waypoint) - 1);
+      element("stage").scrollIntoView({ block: "nearest" });
     });
   }
+  if (!playback.moves) element("playback").dataset.still = "";
+  const calm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  playback.play(playback.moves && !calm);
+}
 
-  // Playback.
-  const { animator } = viewer;
-  const frames = data.frames;
-  if (frames.time_s.length < 2) {
-    element("playback").hidden = true;
-    return;
-  }
-  const [play, scrubber] = [element("play"), element("scrubber")];
-  scrubber.max = animator.duration;
-  play.addEventListener("click", () => (animator.playing ? animator.pause() : animator.play()));
-  scrubber.addEventListener("input", () => {
-    animator.pause();
-    animator.seek(Number(scrubber.value));
+function connectPrinter(viewer) {
+  // A canvas is blank on paper: a picture stands in for it.
+  const picture = element("picture");
+  window.addEventListener("beforeprint", () => {
+    picture.src = viewer.capture_image();
+    picture.hidden = false;
   });
-  if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
-    animator.pause();
-  }
+  window.addEventListener("afterprint", () => { picture.hidden = true; });
+}
 
-  const millimetres = (value) => `${value.toFixed(2)} mm`;
-  function show() {
-    const time = animator.actions[0].time;
-    let k = frames.time_s.findIndex((t) => t >= time);
-    k = k < 0 ? frames.time_s.length - 1 : k;
-    const waypoint = Math.round(frames.waypoint[k]);
-    const label = frames.labels[waypoint - 1];
-    play.textContent = animator.playing ? "Pause" : "Play";
-    scrubber.value = time;
-    element("place").textContent = `Waypoint ${waypoint} of ${data.waypoints}${label ? ` · ${label}` : ""}`;
-    element("error-here").textContent =
-      `Error ${millimetres(frames.uncorrected_mm[k])} → ${millimetres(frames.corrected_mm[k])}`;
-    requestAnimationFrame(show);
-  }
-  show();
-})();
+start();

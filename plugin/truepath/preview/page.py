@@ -5,19 +5,25 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
-from typing import Any
 
-import numpy as np
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
 
 from truepath.calibration_parts import StatisticsPart
 from truepath.iso9283 import ErrorStatistics
+from truepath.look import stylesheet
 from truepath.networks_along import NetworksAlong
-from truepath.preview import scene
-from truepath.preview.toolpaths import KeyFrames
+from truepath.preview import colours, scene
+from truepath.preview.keyframes import KeyFrames
+from truepath.preview.payload import payload
+from truepath.preview.recorded import RecordedScene
+from truepath.preview.shown import Remark, ShownPath
+
+MOST_REMARKS = 300
+SCRIPTS = ("camera.js", "playback.js", "page.js")
 
 
 @dataclass(frozen=True)
@@ -28,10 +34,14 @@ class PageText:
         title, robot, calibrated_utc: any text; it is escaped.
         waypoints, outside: how many there are, and how many lie outside the calibrated region.
         magnification: factor by which errors are drawn.
+        scale_mm: error at the end of the colour bar.
+        own_tool: whether the paths are those of the tool that the program states.
         uncorrected, corrected: predicted errors at the waypoints, mm.
         model_error: errors of the calibrated model itself on poses it had not seen, mm; None if unknown.
         missing_meshes: what could not be drawn.
         networks: what they say at the waypoints; None where the calibration has none.
+        remarks: what to look at.
+        has_region: whether the calibrated region is drawn.
     """
 
     title: str
@@ -40,103 +50,59 @@ class PageText:
     waypoints: int
     outside: int
     magnification: float
+    scale_mm: float
+    own_tool: bool
     uncorrected: ErrorStatistics
     corrected: ErrorStatistics
     model_error: StatisticsPart | None
     missing_meshes: tuple[str, ...]
-    networks: NetworksAlong | None = None
+    networks: NetworksAlong | None
+    remarks: tuple[Remark, ...]
+    has_region: bool
 
 
-def render(text: PageText, recorded: scene.RecordedScene, frames: KeyFrames, labels: Sequence[str] | None) -> str:
+def render(text: PageText, shown: ShownPath, recorded: RecordedScene, frames: KeyFrames) -> str:
     """The page.
 
     Args:
         text: what the panel says.
+        shown: the path, for lines and texts of its waypoints.
         recorded: what is to be seen.
-        frames: the animation, for the numbers shown along with it.
-        labels: names of the waypoints.
+        frames: the animation.
     """
-    scripts = [_meshcat("viewer/dist/main.min.js"), _own("page.js")]
+    own = _as_script("\n".join(_read(name) for name in SCRIPTS))
+    scripts = [_meshcat("viewer/dist/main.min.js"), f'"use strict";\n(() => {{\n{own}}})();\n']
     # Only these two scripts may run and nothing may be loaded: not even text that escaped escaping could change that.
     hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
     policy = (
         f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; "
         "base-uri 'none'; form-action 'none'"
     )
-    return "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{escape(text.title)}</title>",
-            f"<style>{_own('page.css')}</style>",
-            "</head>",
-            "<body>",
-            '<div id="meshcat-pane"></div>',
-            _panel(text),
-            f'<script type="application/json" id="scene-data">{_data(text, recorded, frames, labels)}</script>',
-            f"<template>{_licences()}</template>",
-            *(f"<script>{script}</script>" for script in scripts),
-            "</body>",
-            "</html>",
-            "",
-        ]
+    larger = "" if text.magnification == 1 else f"errors drawn {text.magnification:g} times larger"
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["mm"] = _mm
+    return environment.from_string(_read("page.html.jinja")).render(
+        policy=policy,
+        css=Markup(stylesheet() + _read("page.css")),
+        scripts=[Markup(script) for script in scripts],
+        data=Markup(payload(shown, recorded, frames)),
+        licences=Markup(_licences()),
+        text=text,
+        drawn=larger or "errors drawn in true size",
+        gradient=", ".join(colours.ERROR_SCALE),
+        ticks=[f"{share * text.scale_mm:.3g}" for share in (0.0, 0.25, 0.5, 0.75, 1.0)],
+        colours=colours,
+        scene=scene,
+        remarks=text.remarks[:MOST_REMARKS],
+        remark_count=len(text.remarks),
+        has_region=text.has_region,
+        notes=_notes(text),
     )
 
 
-def _panel(text: PageText) -> str:
-    factor = f"{text.magnification:g}"
-    facts = (text.robot, _count(text.waypoints, "waypoint"), f"calibrated {text.calibrated_utc[:10]}")
-    subtitle = " · ".join(f"<span>{escape(fact)}</span>" for fact in facts)
-    drawn = f"error drawn {factor} times larger" if text.magnification != 1 else "error drawn in true size"
-    legend = [
-        _entry(
-            "band", scene.PROGRAMMED, 0.5, "Programmed path", "where the program wants the tool", scene.PATH_PROGRAMMED
-        ),
-        _entry("swatch", scene.UNCORRECTED, 1, "Without correction", drawn, scene.PATH_UNCORRECTED, scene.ERROR_LINES),
-        _entry("swatch", scene.CORRECTED, 1, "With correction", drawn, scene.PATH_CORRECTED),
-        _entry("arm", "#c9cdd2", 1, "Robot on the corrected path", "", scene.ARM),
-        _entry("arm", scene.UNCORRECTED, 0.35, "Robot without correction", drawn, scene.GHOST),
-    ]
-    if text.networks is not None and text.networks.faded.any():
-        name, how = "Networks faded", "the wider, the less they correct"
-        legend.insert(1, _entry("sleeve", scene.FADED, 0.75, name, how, scene.PATH_FADED))
-    if text.outside:
-        swatch = f'<span class="band" style="background:{scene.OUTSIDE};opacity:.6"></span>'
-        legend.insert(1, f"<li><label>{swatch}<span>Outside the calibrated region</span></label></li>")
-    errors = (("mean", text.uncorrected.mean, text.corrected.mean), ("max", text.uncorrected.max, text.corrected.max))
-    rows = "".join(f"<tr><td>{name}</td><td>{a:.3f}</td><td>{b:.3f}</td></tr>" for name, a, b in errors)
-    return f"""<main id="panel">
-<h1>{escape(text.title)}</h1>
-<p class="subtitle">{subtitle}</p>
-<p id="no-webgl" class="warning" hidden>No 3D view: this browser has no WebGL. The numbers below hold all the same.</p>
-<noscript><p class="warning">The 3D view needs JavaScript. The numbers below hold all the same.</p></noscript>
-<ul class="legend">
-{"".join(legend)}
-</ul>
-<table>
-<thead><tr><th>Predicted tool<br>error, mm</th><th>without<br>correction</th><th>with<br>correction</th></tr></thead>
-<tbody>{rows}</tbody>
-</table>
-<div id="playback">
-<button id="play" type="button">Pause</button>
-<input id="scrubber" type="range" min="0" max="1" step="any" value="0" aria-label="Time">
-<div id="readout"><span id="place"></span><span id="error-here"></span></div>
-</div>
-{"".join(f'<p class="note{kind}">{escape(note)}</p>' for kind, note in _notes(text))}
-</main>"""
-
-
-def _entry(shape: str, colour: str, opacity: float, name: str, explanation: str, *nodes: str) -> str:
-    small = f"<small>{escape(explanation)}</small>" if explanation else ""
-    return (
-        f'<li><label><span class="{shape}" style="background:{colour};opacity:{opacity:g}"></span>'
-        f"<span>{escape(name)}{small}</span>"
-        f'<input type="checkbox" checked data-nodes="{" ".join(nodes)}"></label></li>\n'
-    )
+def _mm(value: float) -> str:
+    """Micrometres are the last that matter; what is smaller but not zero is said to be so."""
+    return "< 0.001" if 0 < value < 0.0005 else f"{value:.3f}"
 
 
 def _notes(text: PageText) -> list[tuple[str, str]]:
@@ -156,7 +122,8 @@ def _notes(text: PageText) -> list[tuple[str, str]]:
             f"{text.model_error.max:.3f} mm (max) on measured poses that it had not seen."
         )
     notes.append(("", predicted))
-    notes.append(("", "Robot base frame: x red, y green, z blue. Grid 100 mm."))
+    tool = "the tool that the program states" if text.own_tool else "the tool point of the calibration"
+    notes.append(("", f"Paths are those of {tool}. Grid 100 mm; the large axes are the robot base frame."))
     if text.missing_meshes:
         notes.append((" warning", "Not drawn, file not readable: " + ", ".join(text.missing_meshes)))
     return notes
@@ -176,27 +143,6 @@ def _network_notes(networks: NetworksAlong) -> list[tuple[str, str]]:
     return notes
 
 
-def _data(text: PageText, recorded: scene.RecordedScene, frames: KeyFrames, labels: Sequence[str] | None) -> str:
-    waypoint = np.round(frames.waypoint + 1, 2)
-    passed = np.unique(np.round(waypoint).astype(int))
-    content: dict[str, Any] = {
-        "root": scene.ROOT,
-        "waypoints": text.waypoints,
-        "chunks": [base64.b64encode(chunk).decode("ascii") for chunk in recorded.chunks],
-        "commands": recorded.commands,
-        "view": {"points": recorded.view_points.round(4).tolist(), "direction": recorded.view_direction.tolist()},
-        "frames": {
-            "time_s": frames.time_s.round(4).tolist(),
-            "waypoint": waypoint.tolist(),
-            "uncorrected_mm": frames.error_uncorrected_mm.round(4).tolist(),
-            "corrected_mm": frames.error_corrected_mm.round(4).tolist(),
-            "labels": {} if labels is None else {int(k - 1): str(labels[k - 1]) for k in passed},
-        },
-    }
-    # Within a script element nothing but its end tag (and a comment that hides it) can do harm: no "<" at all.
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
 def _licences() -> str:
     """What the licences of meshcat's viewer and of the libraries in it want to travel with them."""
     libraries = json.loads(_meshcat("viewer/dist/main.min.js.THIRD_PARTY_LICENSES.json"))
@@ -208,8 +154,8 @@ def _meshcat(path: str) -> str:
     return _as_script(files("meshcat").joinpath(path).read_text(encoding="utf-8"))
 
 
-def _own(name: str) -> str:
-    return _as_script(files("truepath.preview").joinpath(name).read_text(encoding="utf-8"))
+def _read(name: str) -> str:
+    return files("truepath.preview").joinpath(name).read_text(encoding="utf-8")
 
 
 def _as_script(source: str) -> str:
@@ -219,7 +165,3 @@ def _as_script(source: str) -> str:
 
 def _sha256(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("" if number == 1 else "s")

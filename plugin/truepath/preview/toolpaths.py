@@ -1,6 +1,6 @@
-"""What the preview shows: where the tool should be, where it would go, and how the arms move along it.
+"""What the preview shows: where the tool should be, where it would go, and where it will go corrected.
 
-All points are those of the calibrated tool point (the probe, X_FE) in the robot base frame B.
+All points are those of one tool point in the robot base frame B: that of the program, or the calibrated one (X_FE).
 """
 
 from __future__ import annotations
@@ -8,21 +8,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truepath import lie
 from truepath.lie import Array
-from truepath.model import CalibratedModel, nominal_flange_poses, nominal_model
-from truepath.robot import NominalRobot
+from truepath.model import CalibratedModel, nominal_flange_poses
+from truepath.preview.shown import ShownPath
 
 CHUNK = 20_000
 FINE_STEP_RAD = np.radians(3.0)  # lines are drawn through joint steps no longer than this
 MOST_PARTS = 60
-LINE_LIMIT = 2_000  # points per line; more cannot be told apart on a screen
-FRAMES_PER_SECOND = 30
-MAX_KEY_FRAMES = 400
-SHORTEST_S, LONGEST_S = 6.0, 40.0
-JOINT_SPEED_RAD_S = 0.6
+MOST_FINE_ROWS = 60_000  # beyond that no rows are added between those of the path
 DRAWN_ERROR_SHARE = 0.09  # of what is seen, for the automatic magnification
 NICE_FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
@@ -33,24 +27,31 @@ class Toolpaths:
 
     Attributes:
         goal: where the program wants the tool.
-        uncorrected: where the real robot takes it if sent to the programmed joints.
+        uncorrected: where the real robot takes it today.
         corrected: where the real robot takes it if sent to the corrected joints.
+        X_BT_goal: ``(K, 4, 4)`` the poses of the tool that the program wants.
     """
 
     goal: Array
     uncorrected: Array
     corrected: Array
+    X_BT_goal: Array
 
     @classmethod
-    def of(cls, model: CalibratedModel, q_programmed: Array, q_corrected: Array) -> Toolpaths:
-        """Tool points for joints ``(K, n)``."""
-        points = np.empty((3, len(q_programmed), 3))
-        for k in range(0, len(q_programmed), CHUNK):
+    def of(
+        cls, model: CalibratedModel, q_meant: Array, q_today: Array, q_corrected: Array, X_FT: Array | None = None
+    ) -> Toolpaths:
+        """Tool points for joints ``(K, n)``: meant, sent today, sent with the correction; see ``ShownPath``."""
+        X_FT = model.X_FE if X_FT is None else X_FT
+        poses = np.empty((3, len(q_meant), 4, 4))
+        for k in range(0, len(q_meant), CHUNK):
             part = slice(k, k + CHUNK)
-            X_BF_goal = model.goal_flange_poses(nominal_flange_poses(model.robot, q_programmed[part]))
-            X_BF = (X_BF_goal, model.flange_poses(q_programmed[part]), model.flange_poses(q_corrected[part]))
-            points[:, part] = [(X @ model.X_FE)[:, :3, 3] for X in X_BF]
-        return cls(*points)
+            poses[0, part] = model.goal_flange_poses(nominal_flange_poses(model.robot, q_meant[part]))
+            poses[1, part] = model.flange_poses(q_today[part])
+            poses[2, part] = model.flange_poses(q_corrected[part])
+        poses = poses @ X_FT
+        goal, uncorrected, corrected = poses[..., :3, 3]
+        return cls(goal, uncorrected, corrected, poses[0])
 
     def errors_mm(self) -> tuple[Array, Array]:
         """``(K,)`` distances from the goal without and with correction, mm."""
@@ -62,67 +63,80 @@ class Toolpaths:
     def magnified(self, factor: float) -> Toolpaths:
         """The same with errors drawn larger: goal + factor × (actual − goal)."""
         uncorrected, corrected = (self.goal + factor * (p - self.goal) for p in (self.uncorrected, self.corrected))
-        return Toolpaths(self.goal, uncorrected, corrected)
+        return Toolpaths(self.goal, uncorrected, corrected, self.X_BT_goal)
+
+    def at(self, rows: Array) -> Toolpaths:
+        """Some of the points."""
+        return Toolpaths(self.goal[rows], self.uncorrected[rows], self.corrected[rows], self.X_BT_goal[rows])
 
 
-@dataclass(frozen=True, eq=False)
-class KeyFrames:
-    """The animation: K moments and where the arms are then.
+def fine_positions(q_rad: Array, joined: Array | None = None) -> Array:
+    """``(K,)`` fractional row numbers, close enough for a line between rows ``(N, n)`` to show the arc.
 
-    Attributes:
-        time_s: ``(K,)`` from 0.
-        waypoint: ``(K,)`` place in the program, counted from 0; between waypoints a fraction.
-        q_uncorrected, q_corrected: ``(K, n)`` joints with which the nominal arm, as it is drawn, has its tool
-            point on the magnified line of the real robot.
-        error_uncorrected_mm, error_corrected_mm: ``(K,)`` true size of the errors there.
-    """
+    Between rows the joints are taken to move linearly.
 
-    time_s: Array
-    waypoint: Array
-    q_uncorrected: Array
-    q_corrected: Array
-    error_uncorrected_mm: Array
-    error_corrected_mm: Array
-
-
-def fine_positions(q_rad: Array) -> Array:
-    """``(K,)`` fractional waypoint numbers, close enough for a line between waypoints ``(N, n)`` to show the arc.
-
-    Between waypoints the joints are taken to move linearly.
+    Args:
+        joined: ``(N,)`` False where a row is not reached from the one before: no line leads there. None: all are.
     """
     steps = np.abs(np.diff(q_rad, axis=0)).max(axis=1, initial=0.0)
     parts = np.clip(np.ceil(steps / FINE_STEP_RAD), 1, MOST_PARTS).astype(int)
+    if joined is not None:
+        parts = np.where(joined[1:], parts, 1)
+    if parts.sum() > MOST_FINE_ROWS:
+        parts = np.maximum(parts * min(1.0, MOST_FINE_ROWS / parts.sum()), 1).astype(int)
     start = np.repeat(np.arange(len(parts)), parts)
     within = np.arange(len(start)) - np.repeat(np.cumsum(parts) - parts, parts)
     return np.append(start + within / np.repeat(parts, parts), len(q_rad) - 1.0)
 
 
-def interpolate(q_rad: Array, position: Array) -> Array:
-    """``(K, n)`` joints at fractional waypoint numbers ``(K,)`` of a path ``(N, n)``."""
+def interpolate(rows: Array, position: Array) -> Array:
+    """``(K, n)`` values at fractional row numbers ``(K,)`` of rows ``(N, n)``."""
     before = np.floor(position).astype(int)
-    after = np.minimum(before + 1, len(q_rad) - 1)
+    after = np.minimum(before + 1, len(rows) - 1)
     share = (position - before)[:, None]
-    return q_rad[before] * (1.0 - share) + q_rad[after] * share
+    return rows[before] * (1.0 - share) + rows[after] * share
 
 
-def thin_out(points: Array, limit: int = LINE_LIMIT) -> NDArray[np.int64]:
-    """Indices of at most ``limit`` of the points ``(K, 3)`` whose line looks like the line through all.
+@dataclass(frozen=True, eq=False)
+class FinePaths:
+    """The paths through K points close enough to each other to be drawn.
 
-    Of each block of neighbours the first is kept, and the one that lies furthest from the chord: corners stay.
+    Attributes:
+        position: ``(K,)`` fractional rows of the shown path.
+        q_meant, q_corrected: ``(K, n)`` joints there.
+        paths: in true size.
+        piece: ``(K,)`` number of the connected piece of the line.
+        outside: ``(K,)`` True where the calibration data did not reach.
+        waypoint: ``(T,)`` which of these points are the waypoints.
     """
-    K = len(points)
-    if limit >= K:
-        return np.arange(K)
-    blocks = limit // 2 - 1
-    edges = np.linspace(0, K - 1, blocks + 1).astype(int)
-    block = np.minimum(np.searchsorted(edges, np.arange(K), side="right") - 1, blocks - 1)
-    a, b = points[edges[block]], points[edges[block + 1]]
-    chord = b - a
-    share = np.einsum("ki,ki->k", points - a, chord) / np.maximum(np.einsum("ki,ki->k", chord, chord), 1e-30)
-    distance = np.linalg.norm(points - a - np.clip(share, 0.0, 1.0)[:, None] * chord, axis=1)
-    by_block = np.lexsort((distance, block))
-    furthest = by_block[np.append(np.flatnonzero(np.diff(block[by_block])), K - 1)]
-    return np.unique(np.concatenate([edges, furthest]))
+
+    position: Array
+    q_meant: Array
+    q_corrected: Array
+    paths: Toolpaths
+    piece: Array
+    outside: Array
+    waypoint: Array
+
+    @classmethod
+    def of(cls, model: CalibratedModel, shown: ShownPath, outside: Array) -> FinePaths:
+        """Of a shown path of N rows.
+
+        Args:
+            outside: ``(N,)`` True where the calibration data did not reach.
+        """
+        position = fine_positions(shown.q_meant, shown.joined)
+        meant, today, corrected = (interpolate(q, position) for q in (shown.q_meant, shown.q_today, shown.q_corrected))
+        row = np.ceil(position - 1e-9).astype(int)
+        return cls(
+            position,
+            meant,
+            corrected,
+            Toolpaths.of(model, meant, today, corrected, shown.X_FT),
+            np.cumsum(~shown.joined)[row],
+            outside[np.round(position).astype(int)],
+            np.searchsorted(position, shown.waypoint - 1e-9),
+        )
 
 
 def nice_magnification(paths: Toolpaths) -> float:
@@ -132,49 +146,3 @@ def nice_magnification(paths: Toolpaths) -> float:
     error = float(np.quantile(np.linalg.norm(paths.uncorrected - paths.goal, axis=1), 0.95))
     wanted = DRAWN_ERROR_SHARE * size / max(error, 1e-9)
     return max((factor for factor in NICE_FACTORS if factor <= wanted), default=1.0)
-
-
-def animate(model: CalibratedModel, q_programmed: Array, q_corrected: Array, magnification: float) -> KeyFrames:
-    """Key frames of a run through the path at even joint speed, in 6 to 40 seconds.
-
-    Args:
-        q_programmed, q_corrected: ``(N, n)``.
-        magnification: as the lines are drawn.
-    """
-    travel = np.append(0.0, np.cumsum(np.abs(np.diff(q_programmed, axis=0)).max(axis=1, initial=0.0)))
-    if travel[-1] > 0:
-        duration = float(np.clip(travel[-1] / JOINT_SPEED_RAD_S, SHORTEST_S, LONGEST_S))
-        time_s = np.linspace(0.0, duration, min(MAX_KEY_FRAMES, int(duration * FRAMES_PER_SECOND) + 1))
-        waypoint = np.interp(time_s / duration * travel[-1], travel, np.arange(len(travel)))
-    else:
-        time_s = waypoint = np.zeros(1)
-    programmed, corrected = interpolate(q_programmed, waypoint), interpolate(q_corrected, waypoint)
-    paths = Toolpaths.of(model, programmed, corrected)
-    drawn = paths.magnified(magnification)
-    return KeyFrames(
-        time_s,
-        waypoint,
-        joints_reaching(model.robot, drawn.uncorrected, model.X_FE[:3, 3], programmed),
-        joints_reaching(model.robot, drawn.corrected, model.X_FE[:3, 3], programmed),
-        *paths.errors_mm(),
-    )
-
-
-def joints_reaching(robot: NominalRobot, p_BP: Array, p_FP: Array, q_start: Array) -> Array:
-    """Joints ``(K, n)`` near ``q_start`` that bring a point of the nominal flange to ``p_BP`` ``(K, 3)``.
-
-    For drawing only: the shortest damped joint steps, which come as near as they can if a point is out of reach.
-
-    Args:
-        p_FP: ``(3,)`` the point in the flange frame, m.
-    """
-    forward, q = nominal_model(robot).flange_poses_and_jacobian, q_start.copy()
-    for _ in range(8):
-        X_BF, J = forward(q)
-        offset = X_BF[:, :3, :3] @ p_FP
-        J_point = J[:, 3:] - lie.skew(offset) @ J[:, :3]
-        missing = p_BP - X_BF[:, :3, 3] - offset
-        J_t = np.swapaxes(J_point, 1, 2)
-        step = (J_t @ np.linalg.solve(J_point @ J_t + 1e-4 * np.eye(3), missing[..., None]))[..., 0]
-        q += step * np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-12))
-    return q

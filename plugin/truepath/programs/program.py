@@ -83,6 +83,10 @@ class Program(Protocol):
         """Moves that stay as they are."""
 
     @property
+    def unreached(self) -> tuple[int, ...]:
+        """Lines of moves that are never made, and stay as they are."""
+
+    @property
     def states_tool(self) -> bool:
         """Whether it says which tool it works with."""
 

@@ -32,6 +32,7 @@ class ToolpathProgram:
     comment: str | None = None
     states_tool: bool = False
     unresolved: tuple[Unresolved, ...] = ()
+    unreached: tuple[int, ...] = ()
 
     @property
     def file(self) -> str:

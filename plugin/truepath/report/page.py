@@ -10,6 +10,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from truepath.diagnosis import Diagnosis
+from truepath.look import stylesheet
 from truepath.report import sections, stage_strip
 from truepath.report.distribution import distributions
 from truepath.report.drawn import Drawn, Plot
@@ -34,7 +35,7 @@ def render(diagnosis: Diagnosis) -> str:
     environment.filters["drawing"] = _drawing
     return environment.from_string(_own("page.html.jinja")).render(
         policy=policy,
-        css=Markup(_own("page.css")),
+        css=Markup(stylesheet() + _own("page.css")),
         script=Markup(script),
         verdict=diagnosis.verdict,
         facts=sections.facts(diagnosis),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from truepath.controller import Controller
 from truepath.errors import InputError
 from truepath.inverse import joints_along_path
@@ -25,6 +27,7 @@ def open_program(
     prefer: Region,
     controller: Controller,
     tool: Sequence[float] | None = None,
+    start_rad: Sequence[float] | None = None,
 ) -> Program:
     """Reads a program.
 
@@ -33,6 +36,7 @@ def open_program(
         robot: that it is for.
         prefer: where joints lie usually; tells in which posture a toolpath of poses starts.
         controller: of the robot.
+        start_rad: joints near which a toolpath of poses starts.
         tool: for a script, see ``urscript.script.parse_script``.
 
     Raises:
@@ -60,5 +64,6 @@ def open_program(
         q = toolpath.q_rad
     else:
         assert toolpath.X_BF is not None
-        q = joints_along_path(robot, toolpath.X_BF, prefer, toolpath.table.lines, str(path))
+        start = None if start_rad is None else np.array(start_rad)
+        q = joints_along_path(robot, toolpath.X_BF, prefer, toolpath.table.lines, str(path), start)
     return ToolpathProgram(toolpath, q, controller.X_BC, controller.X_F0)

@@ -15,12 +15,11 @@ from truepath.errors import CorrectionError
 from truepath.guards import Finding
 from truepath.lie import Array
 from truepath.model import nominal_flange_poses
-from truepath.postures import follow_targets
-from truepath.programs.motions import Kind, Motions
+from truepath.programs.motions import Motions
+from truepath.rewriting.known_postures import known_postures
 from truepath.robot import NominalRobot
 
 OF_THE_WHOLE = ("tools", "possible")  # of a program, not of each of its targets
-BY_TOOL = (Kind.LINEAR, Kind.PROCESS, Kind.THROUGH, Kind.ARC)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,21 +93,19 @@ def plan_targets(
     near = motions.q_near_rad.copy()
     if start_rad is not None:
         near[is_pose & motions.starts & (motions.origin < 0) & np.isnan(near[:, 0])] = start_rad
-    # The posture stays what it was while the tool goes along a line or an arc.
-    by_tool = np.isin(motions.kind, BY_TOOL) & np.isnan(near[:, 0])
-    followed = follow_targets(robot, X_BF, motions.q_rad, near, motions.origin, is_straight=by_tool)
+    followed = known_postures(robot, motions, X_BF, near)
     lost = ~followed.reached & ~followed.start_unknown & ~followed.ambiguous
     if lost.any():
         k = int(np.argmax(lost))
         x, y, z = 1e3 * motions.X_CT[k, :3, 3]
         raise CorrectionError(
-            "the target is out of reach",
+            "the target is out of reach, or beyond a joint limit from where the robot comes",
             file=file,
             line=int(motions.line[k]),
-            expected=f"a pose that {robot.name} can take, in its base frame",
+            expected=f"a pose that {robot.name} can take from there, in its base frame",
             found=f"the tool at ({x:.1f}, {y:.1f}, {z:.1f}) mm",
         )
-    doubtful = followed.start_unknown | followed.ambiguous
+    doubtful = followed.start_unknown | followed.ambiguous | ~followed.certain
     kept = np.flatnonzero(~doubtful)
     chosen = select(motions, kept)
     q = followed.q_rad[kept]

@@ -25,6 +25,7 @@ from truepath.rewriting.named_robot import robot_named_in
 from truepath.rewriting.open import open_program
 from truepath.rewriting.options import RewriteOptions
 from truepath.rewriting.plan import Plan, plan_targets
+from truepath.rewriting.said import program_findings
 from truepath.rewriting.vias import Vias, choose_vias
 from truepath.rewriting.watch import watch
 from truepath.rewriting.ways import Ways, sample_ways
@@ -134,7 +135,7 @@ def rewrite_program(
     robot, region = calibration.model.robot, calibration.region.region()
     controller = controller_of(robot, options.controller_kinematics)
     say("reading the program")
-    program = open_program(path, robot, region, controller, options.tool)
+    program = open_program(path, robot, region, controller, options.tool, options.start_rad)
     return rewrite(program, calibration, controller, options, today=today, say=say)
 
 
@@ -164,6 +165,7 @@ def rewrite(
     findings = [
         *calibration_findings(calibration, robot_named_in(program.text), today, options.max_age_days),
         *findings,
+        *program_findings(program, options),
         *_too_far_off(plan, ways, vias, tolerance_mm, program),
         *doubtful_findings(
             plan, motions.possible, X_end, model, controller, tolerance_mm, options.max_correction_mm, file

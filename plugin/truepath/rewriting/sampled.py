@@ -32,6 +32,7 @@ class SampledTrajectory:
     text: str = ""
     states_tool: bool = False
     unresolved: tuple[Unresolved, ...] = ()
+    unreached: tuple[int, ...] = ()
 
     @property
     def raw(self) -> bytes:

@@ -49,6 +49,10 @@ class Asked(Protocol):
 
     def call(self, node: Node, arguments: list[Value], keywords: dict[str, Value], line: Line) -> Value | Written: ...
 
+    def forget(self, name: str, why: str) -> None: ...
+
+    def perhaps(self, node: Node, line: Line) -> Value: ...
+
     def start_thread(self, name: str) -> None: ...
 
     def takes_literals(self, name: str) -> bool: ...
@@ -123,12 +127,20 @@ def _rare(op: str, args: tuple[Any, ...], line: Line, scene: Asked) -> Value:
     if op == "not_":
         value = evaluate(args[0], line, scene)
         return not value if isinstance(value, bool) else _cannot("not", value)
-    if op in ("and_", "or_", "xor_"):
+    if op in ("and_", "or_"):
+        # Whether the second one is looked at, if the first decides, only the controller knows.
+        return _logic(op, evaluate(args[0], line, scene), scene.perhaps(args[1], line))
+    if op == "xor_":
         return _logic(op, evaluate(args[0], line, scene), evaluate(args[1], line, scene))
     if op == "method":
         for each in args[2] or ():
             evaluate(each.args[1] if each.op == "keyword" else each, line, scene)
-        return Unknown(f"{word(args[1], line)}() is known to the controller only")
+        name, owner = word(args[1], line), args[0]
+        while owner.op in ("index", "member", "method"):
+            owner = owner.args[0]
+        if owner.op == "name":
+            scene.forget(word(owner, line), f"{word(owner, line)} is changed by {name}(), perhaps")
+        return Unknown(f"{name}() is known to the controller only")
     if op == "of_threads":
         if args[0] == "run" and args[1].op == "call":
             scene.start_thread(word(args[1].args[0], line))

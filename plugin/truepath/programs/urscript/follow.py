@@ -22,7 +22,6 @@ from truepath.programs.urscript.tree import Statement
 from truepath.programs.urscript.values import Pose, Unknown, Value
 
 MOST_ROUNDS = 30
-ONLY_STATE = (*DEFINES, "assign", "declare")
 
 
 class Follower(Scene):
@@ -41,9 +40,10 @@ class Follower(Scene):
     def _run(self, program: list[Statement]) -> None:
         self._define(program)
         self._block(program)
-        if any(statement.node.op not in ONLY_STATE for statement in program):
+        calls = {word(call, each.line) for each in program if each.node.op not in DEFINES for call in each.shape.calls}
+        if self.moves.by_step or calls & self._frame.functions.keys():
             return
-        # Nothing is done: the definitions are the programs. Those that others call are not.
+        # Nothing is moved, nothing called: the definitions are the programs. Those that others call are not.
         used = called_anywhere(program)
         for statement in program:
             if statement.node.op == "function" and word(statement.node.args[0], statement.line) not in used:

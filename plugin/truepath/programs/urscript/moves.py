@@ -36,6 +36,8 @@ MOVES = {
     "movec": Signature(("pose_via", "pose_to", "a", "v", "r", "mode"), (Kind.THROUGH, Kind.ARC)),
     "servoj": Signature(("q", "a", "v", "t", "lookahead_time", "gain"), (Kind.SERVO,)),
 }
+SET_TOOL = "set_tcp"
+NOT_CORRECTED = {"servoc", "servol", "optimovej", "optimovel"}  # they have targets, but stay as they are
 TURNING = "mode"  # of movec: anything but 0 makes the tool turn with the arc, whatever pose its end states
 # After these nobody knows where the robot is,
 LEAD_ELSEWHERE = {

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from truepath.programs.urscript.evaluate import word
+from truepath.programs.urscript.moves import MOVES, NOT_CORRECTED
 from truepath.programs.urscript.syntax import Node
 from truepath.programs.urscript.tree import Statement
 
+TO_A_TARGET = MOVES.keys() | NOT_CORRECTED
 DEFINES = ("function", "thread", "secondary")
 
 
@@ -22,6 +24,15 @@ def all_statements(statements: list[Statement]) -> list[Statement]:
 def called_anywhere(statements: list[Statement]) -> set[str]:
     """Functions that are called somewhere."""
     return {word(call, each.line) for each in all_statements(statements) for call in each.shape.calls}
+
+
+def moves_in(statements: list[Statement]) -> set[int]:
+    """Lines in which the robot is moved to a target."""
+    found = set()
+    for each in all_statements(statements):
+        if each.shape.calls and any(word(call, each.line) in TO_A_TARGET for call in each.shape.calls):
+            found.add(each.line.number)
+    return found
 
 
 def own_names(function: Statement) -> set[str]:
@@ -50,18 +61,29 @@ def assigned(statement: Statement) -> str:
 
 def changed_by_threads(program: list[Statement]) -> set[str]:
     """Names to which threads, and the functions that these call, give values of their own."""
+    run = run_by_threads(program)
+    return {assigned(each) for each in run if each.node.op == "assign" and each.node.args[0] != "local"}
+
+
+def called_by_threads(program: list[Statement]) -> set[str]:
+    """Functions that threads, and the functions that these call, call."""
+    return {word(call, each.line) for each in run_by_threads(program) for call in each.shape.calls}
+
+
+def run_by_threads(program: list[Statement]) -> list[Statement]:
+    """Statements of threads, and of the functions that these call."""
     everything = all_statements(program)
     functions = {word(each.node.args[0], each.line): each for each in everything if each.node.op in DEFINES}
     waiting = [each for each in functions.values() if each.node.op == "thread"]
     seen: set[int] = set()
-    changed: set[str] = set()
+    found: list[Statement] = []
     while waiting:
         function = waiting.pop()
         if id(function) in seen:
             continue
         seen.add(id(function))
-        for each in all_statements(function.body):
-            if each.node.op == "assign" and each.node.args[0] != "local":
-                changed.add(assigned(each))
-            waiting += [functions[name] for name in (word(c, each.line) for c in each.shape.calls) if name in functions]
-    return changed
+        own = all_statements(function.body)
+        found += own
+        called = {word(call, each.line) for each in own for call in each.shape.calls}
+        waiting += [functions[name] for name in called if name in functions]
+    return found

@@ -6,10 +6,20 @@ from collections.abc import Callable
 
 from truepath.errors import InputError
 from truepath.programs.urscript.evaluate import built_in, evaluate, handed_on, word
-from truepath.programs.urscript.moves import LEAD_ASIDE, LEAD_ELSEWHERE, MOVES, Move, Moves, Step
+from truepath.programs.urscript.moves import (
+    LEAD_ASIDE,
+    LEAD_ELSEWHERE,
+    MOVES,
+    NOT_CORRECTED,
+    SET_TOOL,
+    Move,
+    Moves,
+    Step,
+)
 from truepath.programs.urscript.names import (
     DEFINES,
     all_statements,
+    called_by_threads,
     changed_by_threads,
     own_names,
     parameters,
@@ -40,7 +50,10 @@ class Scene:
         self._steps = max(STEPS, STEPS_PER_STATEMENT * len(all_statements(program)))
         self._own_names: dict[Statement, set[str]] = {}
         self._statement: Statement | None = None
+        self._tool_of_threads: Unknown | None = None
         self._volatile = changed_by_threads(program)
+        if SET_TOOL in called_by_threads(program):
+            self._state.tool = self._tool_of_threads = Unknown("a thread calls set_tcp()")
 
     def _block(self, statements: list[Statement]) -> bool:
         """Follows statements; False if nothing comes after them."""
@@ -106,9 +119,15 @@ class Scene:
             return self._enter(*defined, arguments, keywords)
         if name in MOVES:
             return self._move(node, name, arguments, keywords, line)
-        if name == "set_tcp":
+        if name == SET_TOOL:
             tool = arguments[0] if arguments else keywords.get("pose", Unknown("set_tcp() names no pose"))
-            self._state.tool = tool if isinstance(tool, (Pose, Unknown)) else Unknown("set_tcp() is not given a pose")
+            known = tool if isinstance(tool, (Pose, Unknown)) else Unknown("set_tcp() is not given a pose")
+            self._state.tool = self._tool_of_threads or known
+        if name in NOT_CORRECTED:
+            assert self._statement is not None
+            why = f"{name}() is not corrected"
+            move = Move(name, node, self._statement, (), {}, self._state.tool, self._state.last, why)
+            self._note((line.number, node.start), move)
         if name in LEAD_ELSEWHERE:
             self._state.last = ANYWHERE
         if name in LEAD_ASIDE:
@@ -117,6 +136,23 @@ class Scene:
             self._goes_on(STEPS_OF_ALGEBRA, self._statement)
         value = built_in(name, arguments, keywords)
         return Unknown(f"{name}() is known to the controller only") if value is None else value
+
+    def forget(self, name: str, why: str) -> None:
+        """The value of a variable is not known any more."""
+        place = self._place(name)
+        if place in self._state.values:
+            self.used(self._state.values[place])
+            self._state.values[place] = Unknown(why)
+
+    def perhaps(self, node: Node, line: Line) -> Value:
+        """The value of an expression that may be left out; what it does is done or not."""
+        assert self._statement is not None
+        if not self._statement.shape.calls:
+            return evaluate(node, line, self)
+        before = self._kept()
+        value = evaluate(node, line, self)
+        self._state = self._joined([before, self._state])
+        return value
 
     def start_thread(self, name: str) -> None:
         defined = self._frame.function(name)

@@ -15,6 +15,7 @@ from truepath.programs.program import NewTargets, Unresolved, Via
 from truepath.programs.urscript.collector import collector_at_rest
 from truepath.programs.urscript.follow import Follower
 from truepath.programs.urscript.literals import resolve
+from truepath.programs.urscript.names import moves_in
 from truepath.programs.urscript.rewrite import Site, rewritten, stands_alone
 from truepath.programs.urscript.targets import motions_of
 from truepath.programs.urscript.tree import parse
@@ -36,6 +37,7 @@ class Script:
         unresolved: moves that stay as they are.
         sites: per target, where it is written.
         states_tool: whether it is known with which tool it works.
+        unreached: lines of moves that no way through the program leads to.
     """
 
     file: str
@@ -45,6 +47,7 @@ class Script:
     unresolved: tuple[Unresolved, ...]
     sites: tuple[Site, ...]
     states_tool: bool
+    unreached: tuple[int, ...] = ()
     comment: str | None = "#"
 
     def statement(self, at: int) -> str:
@@ -97,10 +100,13 @@ def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> 
     start = NO_TOOL if tool is None else Pose(tuple(float(each) for each in tool))
     with collector_at_rest():
         try:
-            moves = Follower(parse(text, file), file, start).moves
+            program = parse(text, file)
+            moves = Follower(program, file, start).moves
         except RecursionError:
             raise InputError("calls, blocks and brackets are too deep to be followed", file=file) from None
         resolved, left = resolve(moves)
         motions, sites = motions_of(resolved, moves.by_step, start, file)
+    unreached = moves_in(program) - {step[0] for step in moves.by_step}
     unresolved = [Unresolved(move.line.number, move.line.code.strip(), str(move.problem)) for _, move in left]
-    return Script(file, raw, text, motions, tuple(unresolved), sites, bool(np.any(motions.tool)) or tool is not None)
+    states_tool = bool(np.any(motions.tool)) or tool is not None
+    return Script(file, raw, text, motions, tuple(unresolved), sites, states_tool, tuple(sorted(unreached)))

@@ -1,0 +1,297 @@
+"""The reference host as an operator has it: started by one command, worked in a real browser, ended by Ctrl-C."""
+
+import importlib.util
+import io
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+WORKFLOW = Path(__file__).parents[1] / "workflows" / "cell.py"
+CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+CHROMIUM_OPTIONS = [
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",  # WebGL without a graphics card
+    "--enable-unsafe-swiftshader",
+]
+SCREEN = {"width": 900, "height": 500}  # drawn by the processor: every pixel counts
+PATIENCE_S = 90.0
+WRIST = "['truepath', '{arm}', 'ur5', 'wrist_3_link']"
+SCRIPT = """def p():
+  movej([0, -1.5708, 1.5708, -1.5708, -1.5708, 0])
+  movel(get_target_from_plc())
+  movej([0.3, -1.4, 1.5, -1.6, -1.5708, 0])
+end
+"""
+
+
+class Running:
+    """The host as a process."""
+
+    def __init__(self, *arguments):
+        command = [sys.executable, str(WORKFLOW), *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.lines = []
+        watch = threading.Timer(PATIENCE_S, self.process.kill)
+        watch.daemon = True
+        watch.start()
+
+    def read_until(self, start):
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+            if line.startswith(start):
+                return self
+        raise AssertionError("ended too early: " + "\n".join(self.lines))
+
+    @property
+    def address(self):
+        return re.search(r"http://\S+", self.lines[0])[0]
+
+    def interrupt(self):
+        """Ctrl-C; gives the exit code and what was said since."""
+        self.process.send_signal(signal.SIGINT)
+        rest = self.process.stdout.read()
+        return self.process.wait(20), rest
+
+
+def run(*arguments):
+    return subprocess.run(
+        [sys.executable, str(WORKFLOW), *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory):
+    """A program with a move that cannot be resolved."""
+    file = tmp_path_factory.mktemp("cell") / "plc.script"
+    file.write_text(SCRIPT)
+    return file
+
+
+@pytest.fixture(scope="module")
+def running(script):
+    host = Running(str(script)).read_until("ready")
+    yield host
+    if host.process.poll() is None:
+        host.process.kill()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A headless Chromium that can draw. Without one there is nothing to test, except where CI promises one."""
+    executable = next(filter(None, map(shutil.which, CHROMIUM_NAMES)), None)
+    if executable is None:
+        reason = "no Chromium on this machine: looked for " + ", ".join(CHROMIUM_NAMES)
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=executable, args=CHROMIUM_OPTIONS)
+        yield chromium
+        chromium.close()
+
+
+class Tab:
+    """The address in a browser, and all that it complained about."""
+
+    def __init__(self, browser, address):
+        self.complaints, self.requests = [], []
+        self.page = browser.new_page(viewport=SCREEN)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(address)
+        self.page.wait_for_function(f"() => {self.node('arm_corrected')}.object.children.length > 0")
+
+    @staticmethod
+    def node(arm):
+        return f"viewer.scene_tree.find({WRIST.format(arm=arm)})"
+
+    def wrist(self, arm):
+        """``(3,)`` where the last link of an arm is, as the browser has it."""
+        return np.array(self.page.evaluate(f"() => {self.node(arm)}.object.position.toArray()"))
+
+    def wait_until_moved(self, arm, before):
+        x, y, z = before.tolist()
+        self.page.wait_for_function(
+            f"() => {{ const p = {self.node(arm)}.object.position;"
+            f" return Math.hypot(p.x - {x}, p.y - {y}, p.z - {z}) > 1e-4; }}"
+        )
+
+    def is_visible(self, part):
+        return self.page.evaluate(f"() => viewer.scene_tree.find(['truepath', '{part}']).object.visible")
+
+    def picture(self):
+        return np.asarray(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")).astype(int)
+
+
+@pytest.fixture(scope="module")
+def tab(browser, running):
+    return Tab(browser, running.address)
+
+
+def test_it_prints_its_address_first_and_what_it_found(running):
+    assert running.lines[0].startswith("open http://localhost:")
+    assert "for this machine only" in running.lines[0]
+    assert any(line.startswith("warning: line 3 stays as it is") for line in running.lines)
+    numbers = re.search(r"real tool ([\d.]+) mm mean.*corrected ([\d.]+) mm mean", "\n".join(running.lines))
+    assert float(numbers[2]) < 0.02 < 0.5 < float(numbers[1])
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="only Linux tells who listens where")
+def test_it_listens_on_this_machine_only(running):
+    port = int(running.address.rsplit(":", 1)[1])
+    rows = [
+        line.split()
+        for table in ("/proc/net/tcp", "/proc/net/tcp6")
+        if Path(table).exists()
+        for line in Path(table).read_text().splitlines()[1:]
+    ]
+    listening = [row[1].split(":")[0] for row in rows if row[3] == "0A" and int(row[1].split(":")[1], 16) == port]
+    assert listening
+    assert set(listening) <= {"0100007F", "00000000000000000000000001000000"}  # 127.0.0.1 and ::1
+
+
+def test_there_is_something_to_see_in_every_part_of_the_scene(tab):
+    tab.page.wait_for_timeout(2000)
+    picture = tab.picture()
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 500
+    legend, place, middle = picture[:60, 250:600], picture[-60:, 250:600], picture[100:400, 200:700]
+    for part in (legend, place, middle):
+        assert part.max(axis=2).min() < 110 < 200 < part.max()
+
+
+def test_it_asks_nobody_else(tab, running):
+    assert all(url.startswith((running.address, "data:", "blob:")) for url in tab.requests)
+
+
+def test_scrubbing_by_key_and_by_slider_moves_both_arms(tab):
+    for move in (
+        lambda: tab.page.keyboard.press("ArrowRight"),
+        lambda: tab.page.evaluate("() => viewer.gui_controllers['Path, %'].setValue(60)"),
+    ):
+        before = {arm: tab.wrist(arm) for arm in ("arm_corrected", "arm_uncorrected")}
+        move()
+        for arm, position in before.items():
+            tab.wait_until_moved(arm, position)
+
+
+def test_space_plays_and_stops(tab):
+    before = tab.wrist("arm_corrected")
+    tab.page.keyboard.press("Space")
+    tab.wait_until_moved("arm_corrected", before)
+    tab.page.keyboard.press("Space")
+    tab.page.wait_for_function(
+        "() => new Promise(done => { const c = viewer.gui_controllers['Path, %']; const v = c.getValue();"
+        " setTimeout(() => done(c.getValue() === v), 700); })"
+    )
+
+
+def test_keys_hide_parts_and_colour_by_error(tab):
+    for key, part in (("4", "arm_uncorrected"), ("8", "region")):
+        before = tab.is_visible(part)
+        for expected in (not before, before):
+            tab.page.keyboard.press(key)
+            tab.page.wait_for_function(
+                f"() => viewer.scene_tree.find(['truepath', '{part}']).object.visible === {str(expected).lower()}"
+            )
+    tab.page.keyboard.press("c")
+    tab.page.wait_for_timeout(1500)
+    assert len(np.unique(tab.picture().reshape(-1, 3), axis=0)) > 500
+
+
+def test_magnifying_moves_the_ghost_only(tab):
+    ghost, solid = tab.wrist("arm_uncorrected"), tab.wrist("arm_corrected")
+    tab.page.evaluate("() => viewer.gui_controllers['Error, times'].setValue(120)")
+    tab.wait_until_moved("arm_uncorrected", ghost)
+    assert np.linalg.norm(tab.wrist("arm_corrected") - solid) < 2e-3
+    assert np.linalg.norm(tab.wrist("arm_uncorrected") - ghost) > 0.02
+
+
+def test_the_next_warning_is_gone_to_and_marked(tab):
+    tab.page.click("text=Open Controls")
+    tab.page.click("text=Next warning (N)")
+    tab.page.wait_for_function("() => viewer.scene_tree.find(['truepath', 'warning']).object.children.length > 0")
+    tab.page.click("text=Close Controls")
+
+
+def test_nothing_was_complained_of_the_terminal_tells_the_warning_and_ctrl_c_ends_it(running, tab):
+    """The last of those that need it."""
+    tab.page.keyboard.press("b")  # of one warning the previous is the same
+    running.read_until("line 3 stays as it is")
+    assert tab.complaints == [], "something that a test did made the page complain"
+    tab.page.close()
+    code, said = running.interrupt()
+    assert code == 0
+    assert "Traceback" not in said
+
+
+def test_a_calibration_is_saved_and_loaded_and_it_ends_by_itself(tmp_path):
+    file = tmp_path / "calibration.json"
+    first = run("--once", "--save-calibration", str(file))
+    second = run("--seconds", "0.2", "--calibration", str(file))
+    assert first.returncode == second.returncode == 0, first.stderr + second.stderr
+    results = [re.search(r"weld\.script: .*", done.stdout)[0] for done in (first, second)]
+    assert results[0] == results[1]
+    assert "measuring" in first.stdout
+    assert "measuring" not in second.stdout
+
+
+def test_ctrl_c_ends_it_while_it_calibrates():
+    code, said = Running().read_until("measuring").interrupt()
+    assert code == 0
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["no_such.script"], "no_such.script"),
+        (["--calibration", str(WORKFLOW)], "cell.py"),
+        (["--seed", "-1"], "seed"),
+        (["--magnification", "0"], "magnification"),
+        (["--seconds", "nan"], "time"),
+        (["--port", "80"], "port"),
+    ],
+)
+def test_bad_input_gives_one_message_and_exit_code_2(arguments, message):
+    done = run("--once", *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("error: ") == 1
+
+
+def test_a_port_that_is_taken_is_told():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        done = run("--once", "--port", str(taken.getsockname()[1]))
+    assert done.returncode == 2
+    assert "a port that is free" in done.stderr
+
+
+def test_the_plugin_is_found_by_its_entry_point(monkeypatch, capsys):
+    spec = importlib.util.spec_from_file_location("cell_workflow", WORKFLOW)
+    cell = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(cell)
+    from truepath.host import CalibrationPlugin
+
+    assert cell.load_plugin() is CalibrationPlugin
+    asked = []
+    monkeypatch.setattr(cell, "entry_points", lambda **which: asked.append(which) or [])
+    assert cell.main(["--once"]) == 2
+    assert asked == [{"group": "drake_olp.plugins"}]
+    assert "no plugin 'truepath'" in capsys.readouterr().err
