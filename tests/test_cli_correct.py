@@ -320,3 +320,8 @@ def test_a_path_of_poses_starts_from_the_stated_posture(correct, tmp_path):
 def test_a_path_of_joints_has_no_place_for_poses(correct):
     text = (plants.models_dir() / "ur5" / "weld_path.csv").read_text()
     assert is_refused(correct(text, "--as", "poses", name="a.csv"), "no columns for poses")
+
+
+def test_where_collisions_were_looked_for_is_said(correct, weld):
+    assert "looked for collisions in ur5_cell" in correct(weld).out
+    assert "looked for collisions in no cell (--cell)" in correct(weld, "--cell", "none").out

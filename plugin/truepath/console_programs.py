@@ -32,8 +32,8 @@ def print_rewritten(program: RewrittenProgram) -> None:
         warn("warning: the program has no target that can be corrected")
     _print_path(program)
     print_networks(correction)
-    if program.cell is not None:
-        out.print(f"looked for collisions in {program.cell}")
+    cell = "in no cell (--cell)" if program.cell is None else f"in {program.cell}"
+    out.print(f"looked for collisions {cell}")
     for warning in program.warnings:
         warn(warning if warning.startswith("warning: ") else f"warning: {warning}")
     if program.unresolved:
