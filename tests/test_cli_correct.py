@@ -300,6 +300,22 @@ def test_what_follows_a_posture_that_cannot_be_told_cannot_be_told_either(correc
     assert [each["line"] for each in content["unresolved"]] == [2, 3]
 
 
+TIE = """def p():
+  set_tcp(p[0, 0, 0, 0, 0, 0])
+  movej([1.0, -0.83, 0.12, -0.74, -1.57, 0.5])
+  movej(p[-0.487173, -0.109216, 0.431784, 2.220645, 2.220645, 0])
+  movel(p[-0.487173, -0.059216, 0.431784, 2.220645, 2.220645, 0])
+  movej([0, -1.6, 1.7, -1.65, -1.55, 0.1])
+end
+"""
+
+
+def test_what_follows_a_tie_of_two_postures_is_not_corrected_for_a_guess(correct):
+    content = correct(TIE, "--cell", "none", "--json").json()
+    assert [each["line"] for each in content["unresolved"]] == [4, 5]
+    assert content["corrected"] == 2
+
+
 def test_poses_without_a_tool_are_a_warning(correct, poses):
     text = f"def p():\n  movej({HOME})\n  movel({poses[0]})\nend\n"
     guards = [each["guard"] for each in correct(text, "--cell", "none", "--json").json()["findings"]]

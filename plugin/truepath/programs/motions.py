@@ -84,3 +84,25 @@ class Motions:
     def X_0T(self) -> Array:
         """``(N, 4, 4)`` tool in force at each target."""
         return self.tools[self.tool]
+
+
+def joint_path(q_rad: Array, tools: Array, line: Array) -> Motions:
+    """Joints ``(N, n)`` one after the other, nothing else stated; ``tools`` ``(1, 4, 4)`` and ``line`` ``(N,)``."""
+    count = len(q_rad)
+    nothing, before = np.full(count, np.nan), np.arange(count) - 1
+    return Motions(
+        kind=np.full(count, int(Kind.JOINT)),
+        q_rad=q_rad,
+        X_CT=np.full((count, 4, 4), np.nan),
+        q_near_rad=np.full_like(q_rad, np.nan),
+        tools=tools,
+        tool=np.zeros(count, int),
+        line=line,
+        previous=before,
+        origin=before,
+        starts=before < 0,
+        speed=nothing,
+        acceleration=nothing,
+        time_s=nothing,
+        blend_m=nothing,
+    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from truepath import lie
 from truepath.lie import Array
-from truepath.programs.motions import Kind, Motions
+from truepath.programs.motions import Motions, joint_path
 from truepath.programs.program import NewTargets, Unresolved, Via
 from truepath.programs.toolpath_csv import Toolpath
 
@@ -49,25 +49,7 @@ class ToolpathProgram:
     @cached_property
     def motions(self) -> Motions:
         """Waypoints in joints, one from the other; the tool is the flange, of which a toolpath speaks."""
-        count = len(self.q_rad)
-        nothing = np.full(count, np.nan)
-        before = np.arange(count) - 1
-        return Motions(
-            kind=np.full(count, int(Kind.JOINT)),
-            q_rad=self.q_rad,
-            X_CT=np.full((count, 4, 4), np.nan),
-            q_near_rad=np.full_like(self.q_rad, np.nan),
-            tools=lie.invert(self.X_F0)[None],
-            tool=np.zeros(count, int),
-            line=np.asarray(self.toolpath.table.lines),
-            previous=before,
-            origin=before,
-            starts=before < 0,
-            speed=nothing,
-            acceleration=nothing,
-            time_s=nothing,
-            blend_m=nothing,
-        )
+        return joint_path(self.q_rad, lie.invert(self.X_F0)[None], np.asarray(self.toolpath.table.lines))
 
     def statement(self, at: int) -> str:
         """The row of a waypoint."""

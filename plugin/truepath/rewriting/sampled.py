@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepath.lie import Array
-from truepath.programs.motions import Kind, Motions
+from truepath.programs.motions import Motions, joint_path
 from truepath.programs.program import NewTargets, Unresolved, Via
 
 
@@ -42,25 +42,7 @@ class SampledTrajectory:
     @property
     def motions(self) -> Motions:
         """From one sample to the next."""
-        count = len(self.q_rad)
-        nothing = np.full(count, np.nan)
-        before = np.arange(count) - 1
-        return Motions(
-            kind=np.full(count, int(Kind.JOINT)),
-            q_rad=self.q_rad,
-            X_CT=np.full((count, 4, 4), np.nan),
-            q_near_rad=np.full_like(self.q_rad, np.nan),
-            tools=np.eye(4)[None],
-            tool=np.zeros(count, int),
-            line=np.arange(count) + 1,
-            previous=before,
-            origin=before,
-            starts=before < 0,
-            speed=nothing,
-            acceleration=nothing,
-            time_s=nothing,
-            blend_m=nothing,
-        )
+        return joint_path(self.q_rad, np.eye(4)[None], np.arange(len(self.q_rad)) + 1)
 
     def statement(self, at: int) -> str:
         """A sample."""
