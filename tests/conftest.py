@@ -1,6 +1,7 @@
 """Robots and data that the tests share."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,10 @@ ROOT = Path(__file__).parents[1]
 # The same examples in every run: what a property test finds today it finds in everybody's run.
 settings.register_profile("truepath", derandomize=True, deadline=None, database=None)
 settings.load_profile("truepath")
+
+# A shell that starts the tests in the background lets them ignore Ctrl-C, and what they start would inherit that.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Seven joints about axes in mixed directions (some not of unit length), turned joint frames, fixed joints
 # between moving ones, a load beside the chain, and a base that is neither upright nor at the origin.

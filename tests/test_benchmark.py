@@ -57,13 +57,28 @@ def test_without_peer_and_data_it_says_so_and_still_compares_the_correction(tmp_
     assert "one at a time, torch" in done.stdout
 
 
+@pytest.fixture
+def answers(benchmark, monkeypatch) -> dict[str, dict]:
+    """The parts that have scripts of their own answer at once; whoever adds an answer spares one more process."""
+    corrected = {"per_waypoint_us": 2.5, "ik_per_waypoint_us": 300.0, "max_error_um": 1e-6, "ik_max_error_um": 2.0}
+    run, answers = benchmark._run, {"correction_benchmark.py": {**corrected, "waypoints": 200}}
+    answers["program_benchmark.py"] = {"lines": 500, "command_s": 3.0, "parse_and_write_share": 0.4}
+    answers["generation_benchmark.py"] = GENERATION
+
+    def answer(command: list[str], **options) -> dict:
+        words = [Path(word).name for word in command]
+        return next((answers[word] for word in words if word in answers), None) or run(command, **options)
+
+    monkeypatch.setattr(benchmark, "_run", answer)
+    return answers
+
+
+@pytest.mark.usefixtures("answers")
 def test_without_peer_the_own_numbers_are_given(benchmark, data_dir, no_peers, monkeypatch, capsys):
     monkeypatch.setenv("TRUEPATH_DATA", str(data_dir))
     code = benchmark.main([*QUICK, *no_peers, "--json"])
     report = json.loads(capsys.readouterr().out)
-    missed = [row["peer_name"] for row in report["rows"] if row["met"] is False]
-    assert set(missed) <= {"one at a time, torch", "Drake IK", ""}  # on the machine, and on so short a path and program
-    assert code == int(bool(missed))
+    assert code == 0
     assert report["schema"] == "truepath.benchmark/1"
     assert "make bench" in report["skipped"][0]
     solve = rows_by_name(report)["kinematic solve"]
@@ -79,24 +94,13 @@ def test_without_peer_the_own_numbers_are_given(benchmark, data_dir, no_peers, m
 
 
 @pytest.fixture
-def canned(benchmark, tmp_path, monkeypatch):
+def canned(answers, tmp_path, monkeypatch):
     """truepath's own processes answer at once; the peer's process is a real one."""
     csv = tmp_path / "data" / "ur5_jacobi2025" / "grid.csv"
     csv.parent.mkdir(parents=True)
     csv.write_text("a header\n" + "a row\n" * 20)
     monkeypatch.setenv("TRUEPATH_DATA", str(tmp_path / "data"))
-    solved = {"solve_s": 0.1, "train_mean_mm": 0.1, "heldout_mean_mm": 0.1, "poses": 20}
-    corrected = {"per_waypoint_us": 2.5, "ik_per_waypoint_us": 300.0, "max_error_um": 1e-6, "ik_max_error_um": 2.0}
-    run, answers = benchmark._run, {"--solve-ours": solved}
-    answers["correction_benchmark.py"] = {**corrected, "waypoints": 200}
-    answers["program_benchmark.py"] = {"lines": 500, "command_s": 3.0, "parse_and_write_share": 0.4}
-    answers["generation_benchmark.py"] = GENERATION
-
-    def answer(command: list[str], **options) -> dict:
-        words = [Path(word).name for word in command]
-        return next((answers[word] for word in words if word in answers), None) or run(command, **options)
-
-    monkeypatch.setattr(benchmark, "_run", answer)
+    answers["--solve-ours"] = {"solve_s": 0.1, "train_mean_mm": 0.1, "heldout_mean_mm": 0.1, "poses": 20}
 
 
 @pytest.mark.usefixtures("canned")
