@@ -9,7 +9,8 @@ from by_loop import error_by_loop, genes, output_by_loop, random_network
 from hypothesis import given
 from hypothesis import strategies as st
 from small_evolution import SMALL
-from truepath.residual.evolution import evolve, first_generation, next_generation, stepped, trials
+from truepath.residual import evolution
+from truepath.residual.evolution import evolve, first_generation, next_generation, stepped
 from truepath.residual.network import with_ones
 from truepath.residual.population import Population, generator_for
 
@@ -28,10 +29,16 @@ def population_of(sizes, seed=0, room=9):
     return Population.of([random_network(rng, 3, size, 2) for size in sizes], room, CPU, torch.float64)
 
 
+@pytest.fixture(params=["_trials_on_cpu", "_trials_on_gpu"])
+def trials(request):
+    """The compiled trials, and those of a GPU, whose tensors may lie on a CPU too."""
+    return getattr(evolution, request.param)
+
+
 # Mutation
 
 
-def test_a_mutant_is_the_best_with_half_the_difference_of_two_others():
+def test_a_mutant_is_the_best_with_half_the_difference_of_two_others(trials):
     """Eq. 19; without crossover a trial is the mutant itself."""
     population, best = population_of([4] * 6), 2
     trial = trials(population, best, replace(SMALL, crossover=1.0), generator_for(0, 1, CPU))
@@ -42,7 +49,7 @@ def test_a_mutant_is_the_best_with_half_the_difference_of_two_others():
         assert min(np.abs(found - expected).max() for expected in candidates.values()) < 1e-12
 
 
-def test_two_different_others_are_drawn_and_all_pairs_are():
+def test_two_different_others_are_drawn_and_all_pairs_are(trials):
     population = population_of([3] * 4, seed=1)
     flat = [np.concatenate([part.ravel() for part in genes(population, k).values()]) for k in range(4)]
     drawn = set()
@@ -60,7 +67,7 @@ def test_two_different_others_are_drawn_and_all_pairs_are():
     assert len(drawn) == 12
 
 
-def test_trials_have_the_size_of_the_best_whatever_the_others_have():
+def test_trials_have_the_size_of_the_best_whatever_the_others_have(trials):
     population = population_of([1, 9, 4, 6, 2, 9])
     for best, size in ((0, 1), (1, 9), (2, 4)):
         trial = trials(population, best, SMALL, generator_for(0, 1, CPU))
@@ -68,7 +75,7 @@ def test_trials_have_the_size_of_the_best_whatever_the_others_have():
         assert (trial.output[:, :, size:] == 0).all()
 
 
-def test_what_others_have_beyond_the_length_of_the_best_is_disregarded():
+def test_what_others_have_beyond_the_length_of_the_best_is_disregarded(trials):
     population, settings = population_of([3, 9, 9, 9]), replace(SMALL, crossover=1.0)
     more = population.genes.clone()
     more[1:, 3:, :4] = 1e6
@@ -80,7 +87,7 @@ def test_what_others_have_beyond_the_length_of_the_best_is_disregarded():
             np.testing.assert_array_equal(a, b)
 
 
-def test_what_others_lack_of_the_length_of_the_best_is_drawn_from_minus_1_to_1():
+def test_what_others_lack_of_the_length_of_the_best_is_drawn_from_minus_1_to_1(trials):
     """Against a best of zeros the mutant's neurons beyond all others are half the difference of two random numbers."""
     population = population_of([8, 2, 2, 2, 2, 2, 2, 2])
     zero = [torch.zeros_like(part) for part in (population.genes, population.bias)]
@@ -102,7 +109,7 @@ def test_what_others_lack_of_the_length_of_the_best_is_drawn_from_minus_1_to_1()
 # Crossover
 
 
-def test_nine_numbers_in_ten_are_mutated_the_others_are_the_individual_s_own():
+def test_nine_numbers_in_ten_are_mutated_the_others_are_the_individual_s_own(trials):
     population = population_of([6] * 12, seed=4)
     own, all_of_them = 0, 0
     for generation in range(100):
@@ -114,7 +121,7 @@ def test_nine_numbers_in_ten_are_mutated_the_others_are_the_individual_s_own():
     assert own / all_of_them == pytest.approx(0.1, abs=0.01)
 
 
-def test_single_numbers_are_crossed_not_whole_neurons():
+def test_single_numbers_are_crossed_not_whole_neurons(trials):
     population = population_of([6] * 12, seed=4)
     trial = trials(population, 3, replace(SMALL, crossover=0.5), generator_for(1, 1, CPU))
     kept = (trial.hidden == population.hidden)[:, :6]
@@ -122,7 +129,7 @@ def test_single_numbers_are_crossed_not_whole_neurons():
     assert ((of_neuron > 0) & (of_neuron < 4)).any()
 
 
-def test_an_individual_keeps_only_numbers_that_it_has():
+def test_an_individual_keeps_only_numbers_that_it_has(trials):
     """It has two neurons of the best's six: with no mutation at all these are its own, the other four the mutant's."""
     population = population_of([6, 2, 2, 2])
     trial = trials(population, 0, replace(SMALL, crossover=0.0, factor=0.0), generator_for(0, 1, CPU))

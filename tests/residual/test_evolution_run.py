@@ -11,7 +11,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from small_evolution import SMALL
 from truepath.errors import InputError
-from truepath.residual import population
+from truepath.residual import evaluation
 from truepath.residual.evolution import State, evolve, has_ended
 from truepath.residual.limits import Settings
 
@@ -71,7 +71,7 @@ def test_the_same_seed_gives_the_same_bits_another_seed_others(task):
 
 
 def test_it_is_the_same_to_the_last_bit_on_any_number_of_threads(task, monkeypatch):
-    monkeypatch.setattr(population, "CPU_BYTES", 5000)  # so that there is something to share out
+    monkeypatch.setattr(evaluation, "AT_ONCE", 1)  # so that there is something to share out
     one, three = (evolve(*task, SMALL, 5, threads=threads) for threads in (1, 3))
     assert same(one, three)
 

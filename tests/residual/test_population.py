@@ -37,10 +37,8 @@ SIZES = {
 }
 
 
-@pytest.mark.parametrize("fast", [1, 500, 1 << 30], ids=["one at a time", "some at a time", "all at once"])
 @pytest.mark.parametrize("kind", SIZES)
-def test_errors_are_those_of_each_network_alone_however_many_are_evaluated_together(monkeypatch, kind, fast):
-    monkeypatch.setattr(module, "CPU_BYTES", fast)
+def test_errors_are_those_of_each_network_alone(kind):
     networks, x, target = drawn(SIZES[kind], seed=3)
     expected = [error_by_loop(network, x, target) for network in networks]
     np.testing.assert_allclose(errors(networks, x, target, room=9), expected, rtol=1e-12)
@@ -58,8 +56,7 @@ def test_what_a_gpu_would_compute_is_the_same(monkeypatch, kind, fast):
     np.testing.assert_allclose(squares.numpy(), expected, rtol=1e-12)
 
 
-def test_errors_are_the_same_to_the_last_bit_on_any_number_of_threads(monkeypatch):
-    monkeypatch.setattr(module, "CPU_BYTES", 50_000)  # so that there is something to share out
+def test_errors_are_the_same_to_the_last_bit_on_any_number_of_threads():
     networks, x, target = drawn([3, 8, 20, 40] * 10, seed=5, samples=100)
     population = Population.of(networks, 40, CPU, torch.float32)
     x1, wanted = with_ones(torch.tensor(x, dtype=torch.float32)), torch.tensor(target.T.copy(), dtype=torch.float32)

@@ -1,9 +1,4 @@
-"""What many networks miss, computed by numpy on the cores of a CPU.
-
-numpy's tanh in single precision takes less time than torch's logistic function, and its products of small matrices
-less than torch's, so this is twice as fast. The logistic function of eq. 13 is (1 + tanh(z / 2)) / 2; the halves are
-multiplied into the weights, which are few.
-"""
+"""What many networks miss, on the cores of a CPU."""
 
 from __future__ import annotations
 
@@ -11,42 +6,53 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from truepath.lie import Array
+
+AT_ONCE = 8  # networks: enough for a thread to do, few enough for the last one to be done soon after the others
 
 Item = TypeVar("Item")
 
 
-def squared_misses(genes: Array, bias: Array, x1: Array, target: Array) -> Array:
+def squared_misses(genes: Array, bias: Array, sizes: Array, x1: Array, target: Array, threads: int = 1) -> Array:
     """``(P,)`` squared misses of P networks, summed over samples and outputs, in the precision of the arguments.
 
     Args:
-        genes: ``(P, L, d + 1 + k)`` per neuron its input weights, its threshold, its output weights.
-        bias: ``(P, k)``.
+        genes, bias, sizes: ``(P, L, d + 1 + k)``, ``(P, k)``, ``(P,)`` as a population has them.
         x1: ``(d + 1, N)`` inputs as ``network.with_ones`` makes them.
         target: ``(k, N)``.
+        threads: at most so many; the result does not depend on their number.
     """
-    half = genes.dtype.type(0.5)
-    hidden = half * genes[..., : len(x1)]
-    output = half * genes[..., len(x1) :].swapaxes(1, 2)
-    said = np.matmul(hidden, x1)
-    np.tanh(said, out=said)
-    miss = np.matmul(output, said)
-    miss += (bias + output.sum(axis=2))[:, :, None]
-    miss -= target
-    return np.einsum("pkn,pkn->p", miss, miss)
+    from truepath.residual import compiled
+
+    found = np.empty(len(sizes), target.dtype)
+    precision: Any = target.dtype.type
+    x, wanted = (_in_blocks(values, compiled.BLOCK) for values in (x1[:-1], target))
+    kernel = compiled.misses(len(x1) - 1, len(target), precision)
+    genes, bias = np.ascontiguousarray(genes), np.ascontiguousarray(bias)
+
+    def evaluate(start: int) -> None:
+        stop = min(start + AT_ONCE, len(sizes))
+        kernel(genes, bias, sizes, x, wanted, target.shape[1], found, start, stop)
+
+    share_out(evaluate, range(0, len(sizes), AT_ONCE), threads)
+    return found
+
+
+def _in_blocks(values: Array, size: int) -> Array:
+    """``(B, q size)``: rows of ``(q, N)`` cut into pieces of that size; the last is filled up with zeros."""
+    blocks = -(-values.shape[1] // size)
+    filled = np.pad(values, ((0, 0), (0, blocks * size - values.shape[1])))
+    return filled.reshape(len(values), blocks, size).swapaxes(0, 1).reshape(blocks, -1)
 
 
 def share_out(work: Callable[[Item], None], items: Sequence[Item], threads: int) -> None:
     """Calls ``work`` with each item, on so many threads; the calling one is the first of them.
 
-    An item goes to whoever is free, so that a core which others use holds nobody up. numpy's products are kept to the
-    thread that asks for them; as this belongs to the process, who shares out from several threads at the same time
-    should keep them so all the while.
+    An item goes to whoever is free, so that a core which others use holds nobody up.
     """
     waiting = iter(tuple(items))
 
@@ -54,21 +60,15 @@ def share_out(work: Callable[[Item], None], items: Sequence[Item], threads: int)
         for item in waiting:
             work(item)
 
-    with _blas().limit(limits=1):
-        helpers = [_helpers().submit(drain) for _ in range(min(threads, len(items)) - 1)]
-        try:
-            drain()
-        finally:
-            for helper in helpers:
-                if not helper.cancel():  # one that has not begun has nothing left to do
-                    helper.result()
+    helpers = [_helpers().submit(drain) for _ in range(min(threads, len(items)) - 1)]
+    try:
+        drain()
+    finally:
+        for helper in helpers:
+            if not helper.cancel():  # one that has not begun has nothing left to do
+                helper.result()
 
 
 @cache
 def _helpers() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="evaluation")
-
-
-@cache
-def _blas() -> ThreadpoolController:
-    return ThreadpoolController().select(user_api="blas")

@@ -124,6 +124,28 @@ def trials(population: Population, best: int, settings: Settings, generator: tor
     Mutation (eq. 19) takes the hidden size of the best: what two others have beyond it is disregarded, what they lack
     is drawn at random. Crossover (eq. 20) takes single numbers of the individual where it has them.
     """
+    on_cpu = population.sizes.device.type == "cpu"
+    return (_trials_on_cpu if on_cpu else _trials_on_gpu)(population, best, settings, generator)
+
+
+def _trials_on_cpu(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
+    from truepath.residual import compiled
+
+    limits = torch.iinfo(torch.int64)
+    seeds = torch.randint(limits.min, limits.max, (len(population),), generator=generator).numpy().view(np.uint64)
+    genes, bias, sizes = (part.numpy() for part in (population.genes, population.bias, population.sizes))
+    flat, precision = genes.reshape(len(genes), -1), genes.dtype.type
+    trial, trial_bias = np.zeros_like(flat), np.empty_like(bias)
+    factor, crossover = precision(settings.factor), settings.crossover
+    compiled.trials()(flat, bias, sizes, genes.shape[2], best, factor, crossover, seeds, trial, trial_bias)
+    return Population(
+        torch.from_numpy(trial.reshape(genes.shape)),
+        torch.from_numpy(trial_bias),
+        torch.full_like(population.sizes, int(sizes[best])),
+    )
+
+
+def _trials_on_gpu(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
     count, room = len(population), population.room
     size, device = int(population.sizes[best]), population.sizes.device
     a = torch.randint(count, (count,), generator=generator, device=device)

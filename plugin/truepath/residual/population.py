@@ -11,8 +11,7 @@ import torch
 from truepath.residual import evaluation
 from truepath.residual.network import Network, Tensor, activations, stacked
 
-CPU_BYTES = 2 << 20  # activations of so many networks at a time: few enough for the cache, enough for a thread to do
-GPU_BYTES = 1 << 30
+GPU_BYTES = 1 << 30  # activations of so many networks at a time
 
 Rows = slice | Tensor
 
@@ -92,8 +91,6 @@ class Population:
     def mean_squared_error(self, x1: Tensor, target: Tensor, threads: int = 1) -> Tensor:
         """``(P,)`` squared miss per sample, averaged over the samples (eq. 15).
 
-        Networks of like size are evaluated together.
-
         Args:
             x1: ``(d + 1, N)`` inputs as ``network.with_ones`` makes them.
             target: ``(k, N)``.
@@ -112,17 +109,8 @@ class Population:
         return squares
 
     def _squares_on_cpu(self, x1: Tensor, target: Tensor, threads: int) -> Tensor:
-        genes, bias, inputs, wanted = (tensor.numpy() for tensor in (self.genes, self.bias, x1, target))
-        squares = torch.empty(len(self), dtype=target.dtype)
-        found = squares.numpy()
-
-        def evaluate(group: tuple[Rows, int]) -> None:
-            chosen, neurons = group
-            rows = chosen if isinstance(chosen, slice) else chosen.numpy()
-            found[rows] = evaluation.squared_misses(genes[rows, :neurons], bias[rows], inputs, wanted)
-
-        evaluation.share_out(evaluate, list(self._groups(CPU_BYTES, target)), threads)
-        return squares
+        genes, bias, sizes, given, wanted = (t.numpy() for t in (self.genes, self.bias, self.sizes, x1, target))
+        return torch.from_numpy(evaluation.squared_misses(genes, bias, sizes, given, wanted, threads))
 
     def _groups(self, fast: int, target: Tensor) -> Iterator[tuple[Rows, int]]:
         """Networks of like size, and the largest such: as many as leave their activations in so many fast bytes."""

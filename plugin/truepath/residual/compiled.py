@@ -1,0 +1,177 @@
+"""The inner loops of an evolution on a CPU, compiled when they are first used.
+
+A network's activations never reach memory: its weights stay in registers while the poses go by, as many at a time as
+a vector register holds. numpy and torch write each intermediate result out and read it again.
+
+The compiler unrolls the loops over inputs and outputs, so there is a kernel for each number of them. What it has
+compiled it keeps beside this file, or where numba keeps such things for the user.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+BLOCK = 256  # poses at a time, a multiple of every vector register: what they need stays in the fastest cache
+
+# tanh(w) is about SCALE w P(w^2) / Q(w^2) for |w| <= LIMIT; P and Q from their constants up, the highest is 1.
+LIMIT = np.float32(8.1)
+SCALE = 46.8724770
+P0, P1, P2 = (np.float32(value) for value in (89235.942, 11515.4904, 261.381784))
+Q0, Q1, Q2, Q3 = (np.float32(value) for value in (4182712.59, 1933986.29, 99230.2735, 985.702572))
+
+FAST = {"contract", "nnan", "nsz"}  # fused products, and the processor's own minimum: weights are always numbers
+
+Kernel = Callable[..., None]
+
+
+def compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """The function as machine code that leaves other Python threads alone; kept on disk where that is possible."""
+    options |= {"nogil": True, "error_model": "numpy"}
+    try:
+        return njit(function, cache=True, **options)
+    except RuntimeError:  # there is no folder that can be written
+        return njit(function, **options)
+
+
+@partial(compiled, inline="always", fastmath=FAST)
+def _tanh_over_scale(w):  # type: ignore[no-untyped-def]
+    """``tanh(w) / SCALE`` in single precision, without a branch, so that 16 of them go through a vector register.
+
+    The logistic function ``(1 + tanh(z / 2)) / 2`` made of it is wrong by 3e-7 at most, rounding included: five units
+    in the last place of numbers just below 1. The rational function has the least largest error of its degrees on
+    0 to LIMIT, found by Lawson's weighted least squares (1.5e-7 in tanh); beyond, tanh is as far from 1.
+    """
+    w = min(max(w, -LIMIT), LIMIT)
+    square = w * w
+    above = ((square + P2) * square + P1) * square + P0
+    below = (((square + Q3) * square + Q2) * square + Q1) * square + Q0
+    return w * above / below
+
+
+@partial(compiled, fastmath=FAST | {"reassoc"})  # so that lanes are summed on their own
+def _sum_of_squares(values, start, stop):  # type: ignore[no-untyped-def]
+    total = values.dtype.type(0.0)
+    for n in range(start, stop):
+        total += values[n] * values[n]
+    return total
+
+
+@cache
+def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
+    """The kernel ``(genes, bias, sizes, x, target, poses, found, start, stop)`` for networks of d inputs.
+
+    It writes into ``found[start:stop]`` the squared misses of these networks, summed over poses and outputs.
+
+    Args of the kernel:
+        genes, bias, sizes: ``(P, L, d + 1 + k)``, ``(P, k)``, ``(P,)`` as a population has them.
+        x, target: ``(B, d BLOCK)``, ``(B, k BLOCK)``: a row per block of poses, each quantity's numbers together.
+        poses: how many there are; the last block may have more room.
+        found: ``(P,)``.
+    """
+    block, half, width = BLOCK, precision(0.5), inputs + 1 + outputs
+    single = precision is np.float32
+    scale = precision(0.5 * SCALE if single else 0.5)
+
+    def kernel(genes, bias, sizes, x, target, poses, found, start, stop):  # type: ignore[no-untyped-def]
+        miss = np.empty(outputs * block, precision)
+        constants = np.empty(outputs, precision)
+        first, second = np.empty(width, precision), np.empty(width, precision)
+        for who in range(start, stop):
+            for k in range(outputs):
+                constants[k] = bias[who, k]
+            for neuron in range(sizes[who]):
+                for k in range(outputs):
+                    constants[k] += half * genes[who, neuron, inputs + 1 + k]
+            total = 0.0
+            for part in range(len(x)):
+                given, wanted = x[part], target[part]
+                for k in range(outputs):
+                    for n in range(block):
+                        miss[k * block + n] = constants[k] - wanted[k * block + n]
+                for neuron in range(0, sizes[who], 2):  # two at a time: the poses are loaded once for both
+                    both = neuron + 1 < sizes[who]
+                    for j in range(width):
+                        factor = half if j <= inputs else scale
+                        first[j] = factor * genes[who, neuron, j]
+                        second[j] = factor * genes[who, neuron + 1, j] if both else precision(0.0)
+                    for n in range(block):
+                        one, other = first[inputs], second[inputs]
+                        for i in range(inputs):
+                            one += first[i] * given[i * block + n]
+                            other += second[i] * given[i * block + n]
+                        if single:
+                            one, other = _tanh_over_scale(one), _tanh_over_scale(other)
+                        else:
+                            one, other = math.tanh(one), math.tanh(other)
+                        for k in range(outputs):
+                            so_far = miss[k * block + n] + first[inputs + 1 + k] * one
+                            miss[k * block + n] = so_far + second[inputs + 1 + k] * other
+                for k in range(outputs):
+                    total += _sum_of_squares(miss, k * block, k * block + min(block, poses - part * block))
+            found[who] = total
+
+    return compiled(kernel, fastmath=FAST)
+
+
+@partial(compiled, inline="always")
+def _chance(seed, number):  # type: ignore[no-untyped-def]
+    """A number from 0 to 1 (excluded): the so-many-th of splitmix64 (Steele, Lea, Flood 2014) from that seed."""
+    z = seed + (np.uint64(number) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return ((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+
+
+@compiled
+def _unify(genes, length, seed, number, unified):  # type: ignore[no-untyped-def]
+    """Truncates the genes or continues them at random, from the so-many-th number of the seed on."""
+    for n in range(min(length, len(unified))):
+        unified[n] = genes[n]
+    for n in range(length, len(unified)):
+        unified[n] = 2.0 * _chance(seed, number + n) - 1.0
+
+
+@compiled
+def _cross(own, length, best, one, other, factor, crossover, seed, number, trial):  # type: ignore[no-untyped-def]
+    """Mutation and crossover of the numbers of one individual, of which it has only the first so many."""
+    for n in range(len(one)):
+        kept = n < length and _chance(seed, number + n) >= crossover
+        trial[n] = own[n] if kept else best[n] + factor * (one[n] - other[n])
+
+
+@cache
+def trials() -> Kernel:
+    """The kernel ``(genes, bias, sizes, width, best, factor, crossover, seeds, trial, trial_bias)``, eq. 19 and 20.
+
+    It writes trials of the best one's size into the last two; ``evolution.trials`` says what they are.
+
+    Args of the kernel:
+        genes, bias, sizes: ``(P, L (d + 1 + k))``, ``(P, k)``, ``(P,)``: all neurons of an individual in one row.
+        width: ``d + 1 + k``.
+        best, factor, crossover: who is the best; settings of the evolution, in the precision of the genes.
+        seeds: ``(P,)`` unsigned, for each individual's chance: the result does not depend on the order of work.
+        trial, trial_bias: like ``genes`` and ``bias``; beyond the size of the best nothing is written.
+    """
+
+    def kernel(genes, bias, sizes, width, best, factor, crossover, seeds, trial, trial_bias):  # type: ignore[no-untyped-def]
+        count, outputs = bias.shape
+        length = sizes[best] * width
+        one, other = np.empty(length, genes.dtype), np.empty(length, genes.dtype)
+        for who in range(count):
+            seed = seeds[who]
+            a = int(_chance(seed, 0) * count)
+            b = (a + 1 + int(_chance(seed, 1) * (count - 1))) % count
+            _unify(genes[a], sizes[a] * width, seed, 2, one)
+            _unify(genes[b], sizes[b] * width, seed, 2 + length, other)
+            has, number = sizes[who] * width, 2 + 2 * length
+            _cross(genes[who], has, genes[best], one, other, factor, crossover, seed, number, trial[who])
+            number += length
+            _cross(bias[who], outputs, bias[best], bias[a], bias[b], factor, crossover, seed, number, trial_bias[who])
+
+    return compiled(kernel)
