@@ -1,68 +1,24 @@
 """The reference host as an operator has it: started by one command, worked in a real browser, ended by Ctrl-C."""
 
 import importlib.util
-import io
 import os
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from running_cell import CHROMIUM_NAMES, CHROMIUM_OPTIONS, CORNERS_ON_SCREEN, PATIENCE_S, SCREEN, WORKFLOW, Running, Tab
 
-WORKFLOW = Path(__file__).parents[1] / "workflows" / "cell.py"
-CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM_OPTIONS = [
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",  # WebGL without a graphics card
-    "--enable-unsafe-swiftshader",
-]
-SCREEN = {"width": 900, "height": 500}  # drawn by the processor: every pixel counts
-PATIENCE_S = 90.0
-WRIST = "['truepath', '{arm}', 'ur5', 'wrist_3_link']"
 SCRIPT = """def p():
   movej([0, -1.5708, 1.5708, -1.5708, -1.5708, 0])
   movel(get_target_from_plc())
   movej([0.3, -1.4, 1.5, -1.6, -1.5708, 0])
 end
 """
-
-
-class Running:
-    """The host as a process."""
-
-    def __init__(self, *arguments):
-        command = [sys.executable, str(WORKFLOW), *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.lines = []
-        watch = threading.Timer(PATIENCE_S, self.process.kill)
-        watch.daemon = True
-        watch.start()
-
-    def read_until(self, start):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip("\n"))
-            if line.startswith(start):
-                return self
-        raise AssertionError("ended too early: " + "\n".join(self.lines))
-
-    @property
-    def address(self):
-        return re.search(r"http://\S+", self.lines[0])[0]
-
-    def interrupt(self):
-        """Ctrl-C; gives the exit code and what was said since."""
-        self.process.send_signal(signal.SIGINT)
-        rest = self.process.stdout.read()
-        return self.process.wait(20), rest
 
 
 def run(*arguments):
@@ -103,40 +59,6 @@ def browser():
         chromium.close()
 
 
-class Tab:
-    """The address in a browser, and all that it complained about."""
-
-    def __init__(self, browser, address):
-        self.complaints, self.requests = [], []
-        self.page = browser.new_page(viewport=SCREEN)
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(address)
-        self.page.wait_for_function(f"() => {self.node('arm_corrected')}.object.children.length > 0")
-
-    @staticmethod
-    def node(arm):
-        return f"viewer.scene_tree.find({WRIST.format(arm=arm)})"
-
-    def wrist(self, arm):
-        """``(3,)`` where the last link of an arm is, as the browser has it."""
-        return np.array(self.page.evaluate(f"() => {self.node(arm)}.object.position.toArray()"))
-
-    def wait_until_moved(self, arm, before):
-        x, y, z = before.tolist()
-        self.page.wait_for_function(
-            f"() => {{ const p = {self.node(arm)}.object.position;"
-            f" return Math.hypot(p.x - {x}, p.y - {y}, p.z - {z}) > 1e-4; }}"
-        )
-
-    def is_visible(self, part):
-        return self.page.evaluate(f"() => viewer.scene_tree.find(['truepath', '{part}']).object.visible")
-
-    def picture(self):
-        return np.asarray(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")).astype(int)
-
-
 @pytest.fixture(scope="module")
 def tab(browser, running):
     return Tab(browser, running.address)
@@ -168,9 +90,24 @@ def test_there_is_something_to_see_in_every_part_of_the_scene(tab):
     tab.page.wait_for_timeout(2000)
     picture = tab.picture()
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 500
-    legend, place, middle = picture[:60, 250:600], picture[-60:, 250:600], picture[100:400, 200:700]
+    place, legend, middle = picture[-50:, 250:600], picture[-105:-60, 250:600], picture[50:380, 200:700]
     for part in (legend, place, middle):
         assert part.max(axis=2).min() < 110 < 200 < part.max()
+
+
+@pytest.mark.parametrize(("width", "height"), [(600, 600), (640, 400)])
+def test_the_text_is_seen_whole_in_narrow_windows_and_beside_open_controls(tab, width, height):
+    """As wide as high, and the shape of a laptop's screen; smaller, for everything grows with the height."""
+    tab.page.set_viewport_size(dict(width=width, height=height))
+    tab.page.wait_for_timeout(1500)
+    corners = tab.page.evaluate(CORNERS_ON_SCREEN)
+    assert len(corners) >= 8  # two panes at least: a picture that is being replaced is there still
+    x, y = np.array(corners).T
+    assert np.abs(y).max() <= 1.0
+    controls_px = 245 * height / 800  # of a screen 800 high
+    assert np.abs(x).max() <= 1.0 - (2 * controls_px / width if width > height else 0.0)
+    assert np.ptp(x) > 0.75
+    tab.page.set_viewport_size(SCREEN)
 
 
 def test_it_asks_nobody_else(tab, running):
@@ -205,7 +142,8 @@ def test_keys_hide_parts_and_colour_by_error(tab):
         for expected in (not before, before):
             tab.page.keyboard.press(key)
             tab.page.wait_for_function(
-                f"() => viewer.scene_tree.find(['truepath', '{part}']).object.visible === {str(expected).lower()}"
+                f"() => viewer.scene_tree.find(['truepath', 'ur5', '{part}']).object.visible"
+                f" === {str(expected).lower()}"
             )
     tab.page.keyboard.press("c")
     tab.page.wait_for_timeout(1500)
@@ -223,7 +161,9 @@ def test_magnifying_moves_the_ghost_only(tab):
 def test_the_next_warning_is_gone_to_and_marked(tab):
     tab.page.click("text=Open Controls")
     tab.page.click("text=Next warning (N)")
-    tab.page.wait_for_function("() => viewer.scene_tree.find(['truepath', 'warning']).object.children.length > 0")
+    tab.page.wait_for_function(
+        "() => viewer.scene_tree.find(['truepath', 'ur5', 'warning']).object.children.length > 0"
+    )
     tab.page.click("text=Close Controls")
 
 

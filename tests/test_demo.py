@@ -7,6 +7,7 @@ from html import unescape
 
 import numpy as np
 import pytest
+from command import run
 from truepath import plants
 from truepath.calibration import load_calibration
 from truepath.demo import run_demo
@@ -115,16 +116,52 @@ def test_a_negative_seed_is_refused_before_anything_is_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_ends_by_saying_what_was_gained_and_where_to_look(monkeypatch, capsys, tmp_path):
-    from truepath.cli import main
+@pytest.fixture
+def command(demo, monkeypatch, capsys):
+    """The command on the results that are there already: code, lines of output, addresses that were opened."""
+    folder, result, _ = demo
+    asked = []
 
-    monkeypatch.setattr("sys.argv", ["truepath", "demo", "--folder", str(tmp_path / "results")])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert not stop.value.code
-    verdict, *_, gain, _, report, preview = capsys.readouterr().out.strip().splitlines()
-    assert verdict == json.loads((tmp_path / "results" / "diagnosis.json").read_text())["verdict"]
+    def again(where, seed, say):
+        assert (where, seed) == (folder, 1)
+        return result
+
+    def command(*options, browser=True):
+        monkeypatch.setattr("truepath.demo.run_demo", again)
+        monkeypatch.setattr("webbrowser.open", lambda address: asked.append(address) or browser)
+        outcome = run(monkeypatch, capsys, "demo", "--folder", folder, "--seed", 1, *options)
+        return outcome.code, outcome.out.strip().splitlines(), asked
+
+    return command
+
+
+def test_the_command_ends_by_saying_what_was_gained_and_where_to_look(demo, command):
+    folder = demo[0]
+    code, (verdict, *_, gain, where, preview, report), asked = command()
+    assert code == 0
+    assert verdict == json.loads((folder / "diagnosis.json").read_text())["verdict"]
     assert "computed by Drake" in gain
     assert "times better" in gain
-    assert str(tmp_path / "results" / "report.html") in report
-    assert str(tmp_path / "results" / "preview.html") in preview
+    assert where == "open in a browser:"
+    assert str(folder / "preview.html") in preview
+    assert str(folder / "report.html") in report
+    assert asked == []  # nobody looks on: this is no terminal
+
+
+def test_it_opens_the_page_where_it_is_told_to(demo, command):
+    _, lines, asked = command("--open")
+    assert asked == [(demo[0] / "preview.html").as_uri()]
+    assert lines[-3] == "the preview is open in a browser:"
+
+
+def test_it_opens_nothing_where_it_is_told_not_to(command, monkeypatch):
+    monkeypatch.setattr("truepath.browser.somebody_looks_on", lambda: True)
+    assert command("--no-open")[2] == []
+    assert len(command()[2]) == 1
+
+
+def test_without_a_browser_it_says_so_and_where_to_look(command):
+    code, lines, _ = command("--open", browser=False)
+    assert code == 0
+    assert lines[-4] == "no browser could be started"
+    assert lines[-3] == "open in a browser:"

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 GROUP, NAME = "drake_olp.plugins", "truepath"
 CELL, TOOL, PREFIX = "ur5_cell", "tool_tip", "/cell"
+SKY, HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
 HIDDEN, POSES, NOISE_MM = ("joint_compliance",), 100, 0.02
 
 
@@ -54,7 +55,7 @@ def operate(options: argparse.Namespace) -> None:
     where = "this machine only" if options.host in ("localhost", "127.0.0.1") else f"whoever reaches {options.host}"
     print(f"open {meshcat.web_url()} in a browser (for {where}); Ctrl-C ends it", flush=True)
     host = Host(meshcat)
-    plugin = load_plugin()(host.plant, tool_frame=TOOL, meshcat=meshcat)
+    plugin = load_plugin()(host.plant, tool_frame=TOOL, meshcat=meshcat, scene_graph=host.scene_graph)
     if options.calibration is None:
         calibrate_virtually(plugin, options.seed, say)
     else:
@@ -66,16 +67,15 @@ def operate(options: argparse.Namespace) -> None:
 
     controls = plugin.operate(
         options.program,
-        scene_graph=host.scene_graph,
         magnification=options.magnification,
+        drawn_below=PREFIX,
         options=RewriteOptions(cell=CELL),
         say=lambda text: print(text, flush=True),
     )
-    view, course = controls.view, controls.view.course
-    host.hide(view.own_paths)
+    course = controls.view.course
     for each in course.remarks:
         print(f"warning: {each.text}")
-    before, after = (f"{e.mean():.3f} mm mean, {e.max():.3f} mm max" for e in (course.real_mm, course.corrected_mm))
+    before, after = (f"{errors.mean:.3f} mm mean, {errors.max:.3f} mm max" for errors in course.at_waypoints())
     print(f"{Path(options.program).name}: real tool {before}; corrected {after}")
     print("ready: keys and buttons (Open Controls, top right) work in the browser", flush=True)
     meshcat.Flush()
@@ -99,11 +99,14 @@ class Host:
         self.diagram: Diagram = builder.Build()
         self.context: Context = self.diagram.CreateDefaultContext()
         self.diagram.ForcedPublish(self.context)
+        self._brighten()
 
-    def hide(self, bodies: Sequence[str]) -> None:
-        """Hides bodies that the plugin draws, twice."""
-        for body in bodies:
-            self.meshcat.SetProperty(f"{PREFIX}/{body}", "visible", False)
+    def _brighten(self) -> None:
+        """A bright background without a grid, against which thin lines are seen."""
+        for part in ("/Grid", "/Axes"):
+            self.meshcat.SetProperty(part, "visible", False)
+        for key, colour in (("top_color", SKY), ("bottom_color", HORIZON)):
+            self.meshcat.SetProperty("/Background/<object>", key, colour)
 
 
 def start_meshcat(host: str, port: int | None) -> Meshcat:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,9 +10,11 @@ from truepath.errors import InputError
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
-    from pydrake.multibody.tree import Frame, ModelInstanceIndex, RevoluteJoint
+    from pydrake.multibody.tree import Frame, ModelInstanceIndex, RevoluteJoint, RigidBody
 
 FLANGE_NAMES = ("flange", "tool0", "ee_link", "tool_flange")
+OF_A_GRIPPER = re.compile("finger|gripper|knuckle|jaw|claw|thumb", re.IGNORECASE)
+LEAST_RANGE_RAD = 1.6  # the last joint of an arm turns further
 
 
 @dataclass(frozen=True)
@@ -30,24 +33,39 @@ def locate_arm(
     model_instance: ModelInstanceIndex | None = None,
     base_frame: str | None = None,
     flange_frame: str | None = None,
+    carried: str | Frame | None = None,
 ) -> Arm:
-    """Finds the arm.
+    """Finds the arm. A gripper in the same model is no part of it: its joints lie beyond the flange.
 
     Args:
         plant: finalized.
         model_instance: where the arm is; found by itself when exactly one instance has revolute joints.
         base_frame, flange_frame: names; by default the root of the arm's model, and the end of the chain
-            (a frame called flange, tool0, ee_link or tool_flange, else the last body).
+            (a frame called flange, tool0, ee_link or tool_flange, else the last link before ``carried``, else the
+            last body).
+        carried: a frame, or its name, that moves rigidly with the flange.
 
     Raises:
-        InputError: plant not finalized, no arm or several, a joint of another type in the chain.
+        InputError: plant not finalized, no arm or several, a joint of another type in the chain, or one at its end
+            that looks like a gripper's.
     """
     if not plant.is_finalized():
         raise InputError("the plant is not finalized", expected="call plant.Finalize() first")
     instance = _find_instance(plant) if model_instance is None else model_instance
-    flange = _named_frame(plant, flange_frame, instance) or _find_flange(plant, instance)
+    flange = _named_frame(plant, flange_frame, instance) or _called_flange(plant, instance)
+    is_clear = flange is not None
+    if flange is None:
+        link, end = _last_link_before(plant, carried, instance), _single_end(plant, instance)
+        is_clear = link is not None
+        same = link is not None and end is not None and _last_link(plant, end) == _last_link(plant, link)
+        flange = end if end is not None and (link is None or same) else link
+    if flange is None:
+        raise _no_single_end(plant, instance)
     base = _named_frame(plant, base_frame, instance) or _root_frame(plant, flange, instance)
-    return Arm(instance, base, flange, _chain(plant, base, flange))
+    joints = _chain(plant, base, flange)
+    if not is_clear:
+        _refuse_a_gripper(joints)
+    return Arm(instance, base, flange, joints)
 
 
 def _find_instance(plant: MultibodyPlant) -> ModelInstanceIndex:
@@ -102,20 +120,83 @@ def _root_frame(plant: MultibodyPlant, flange: Frame, instance: ModelInstanceInd
     return body.body_frame()
 
 
-def _find_flange(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame:
+def _called_flange(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame | None:
     for name in FLANGE_NAMES:
         if plant.HasFrameNamed(name, instance):
             return plant.GetFrameByName(name, instance)
-    parents = {int(plant.get_joint(i).parent_body().index()) for i in plant.GetJointIndices(instance)}
-    bodies = plant.GetBodyIndices(instance)
-    leaves = [plant.get_body(b) for b in bodies if int(b) not in parents]
-    if len(leaves) != 1:
+    return None
+
+
+def _last_link_before(plant: MultibodyPlant, carried: str | Frame | None, instance: ModelInstanceIndex) -> Frame | None:
+    """The link of the arm's model that carries a frame by welds alone; None where that is not clear."""
+    from pydrake.multibody.tree import BodyIndex, FrameIndex
+
+    if carried is None:
+        return None
+    if isinstance(carried, str):
+        every = [plant.get_frame(FrameIndex(index)) for index in range(plant.num_frames())]
+        frames = [frame for frame in every if frame.name() == carried]
+    else:
+        frames = [carried]
+    found = {_last_link(plant, frame) for frame in frames} - {None}
+    bodies = [plant.get_body(BodyIndex(index)) for index in found]
+    own = [body for body in bodies if body.model_instance() == instance]
+    return own[0].body_frame() if len(own) == 1 else None
+
+
+def _last_link(plant: MultibodyPlant, frame: Frame) -> int | None:
+    """The body, by its index, to which a frame is fixed and that a joint moves; None for what stands still."""
+    from pydrake.multibody.tree import JointIndex
+
+    inboard, body = inboard_joints(plant), frame.body()
+    while (j := inboard.get(int(body.index()))) is not None:
+        joint = plant.get_joint(JointIndex(j))
+        if joint.type_name() != "weld":
+            return int(body.index())
+        body = joint.parent_body()
+    return None
+
+
+def _refuse_a_gripper(joints: list[RevoluteJoint]) -> None:
+    """The end of a chain that nobody named: a finger there would be calibrated as if it were a joint of the arm."""
+    doubtful = [
+        k for k, joint in enumerate(joints) if OF_A_GRIPPER.search(f"{joint.name()} {joint.child_body().name()}")
+    ]
+    last = joints[-1]
+    if last.position_upper_limits()[0] - last.position_lower_limits()[0] < LEAST_RANGE_RAD:
+        doubtful.append(len(joints) - 1)
+    if doubtful:
+        first = max(min(doubtful), 1)
+        beyond = ", ".join(repr(joint.name()) for joint in joints[first:])
         raise InputError(
-            "cannot tell which body carries the tool",
-            expected="a frame called " + ", ".join(FLANGE_NAMES) + ", a single end of the chain, or flange_frame given",
-            found=", ".join(body.name() for body in leaves),
+            f"the joints at the end of the arm look like those of a gripper: {beyond}",
+            expected=_where_the_arm_ends(joints[first - 1].child_body().name()),
+            found=f"no frame called {', '.join(FLANGE_NAMES)}, so the chain was followed to "
+            f"{last.child_body().name()!r}",
         )
-    return leaves[0].body_frame()
+
+
+def _where_the_arm_ends(link: str = "") -> str:
+    such = f", as flange_frame={link!r}" if link else ""
+    return f"flange_frame, the name of the frame or link where the arm ends{such}; or a tool_frame that it carries"
+
+
+def _ends(plant: MultibodyPlant, instance: ModelInstanceIndex) -> list[RigidBody]:
+    parents = {int(plant.get_joint(i).parent_body().index()) for i in plant.GetJointIndices(instance)}
+    return [plant.get_body(b) for b in plant.GetBodyIndices(instance) if int(b) not in parents]
+
+
+def _single_end(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Frame | None:
+    ends = _ends(plant, instance)
+    return ends[0].body_frame() if len(ends) == 1 else None
+
+
+def _no_single_end(plant: MultibodyPlant, instance: ModelInstanceIndex) -> InputError:
+    return InputError(
+        "cannot tell which body carries the tool",
+        expected=f"a frame called {', '.join(FLANGE_NAMES)}, a single end of the chain, or {_where_the_arm_ends()}",
+        found=", ".join(body.name() for body in _ends(plant, instance)),
+    )
 
 
 def inboard_joints(plant: MultibodyPlant) -> dict[int, int]:
@@ -138,7 +219,9 @@ def _chain(plant: MultibodyPlant, base: Frame, flange: Frame) -> list[RevoluteJo
         elif joint.type_name() != "weld":
             raise InputError(
                 f"joint {joint.name()!r} is of a type that truepath does not calibrate",
-                expected="revolute (or weld) joints between base and flange",
+                expected="revolute (or weld) joints between base and flange. If this one is beyond the arm, a finger "
+                f"of a gripper: {_where_the_arm_ends(joint.parent_body().name())}. If it is below the arm, a rail: "
+                "base_frame, the name of the link on it",
                 found=joint.type_name(),
             )
         body = joint.parent_body()

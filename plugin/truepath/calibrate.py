@@ -116,10 +116,9 @@ def fit_kinematics(robot: NominalRobot, measurements: Measurements, context: Con
     frames.require_variety(X_BF, X_FE, measurements.has_orientation)
     problem = PoseProblem(robot, measurements, X_MB, X_FE)
     names = poe.parameter_names(robot.num_joints)
-    free = independent_columns(problem.evaluate(no_deviation(robot))[1], _rank(names))
+    free = free_parameters(problem.evaluate(no_deviation(robot))[1], names)
     held = {int(i): REDUNDANT for i in np.flatnonzero(~free)}
-    prior_sigma = np.array([PRIOR_WIDTH * name.prior_scale if name.group == "axis" else np.inf for name in names])
-    fit = RobustFit(problem, free, prior_sigma)
+    fit = RobustFit(problem, free, prior_widths(names))
     fit.run()
     return KinematicFit(robot, measurements, context or Context.of(measurements), fit, names, held)
 
@@ -175,6 +174,16 @@ def finish(kinematic: KinematicFit, found: EffectFit) -> Fit:
         iterations=fit.iterations,
         log_evidence=found.log_evidence,
     )
+
+
+def free_parameters(jacobian: Array, names: tuple[poe.ParameterName, ...]) -> Array:
+    """``(k,)`` True for the parameters that poses with this Jacobian ``(N, m, k)`` can tell from each other."""
+    return independent_columns(jacobian, _rank(names))
+
+
+def prior_widths(names: tuple[poe.ParameterName, ...]) -> Array:
+    """``(k,)`` widths of the priors about nominal; infinite for the frames."""
+    return np.array([PRIOR_WIDTH * name.prior_scale if name.group == "axis" else np.inf for name in names])
 
 
 def _rank(names: tuple[poe.ParameterName, ...]) -> Array:

@@ -34,6 +34,7 @@ from truepath.files import write_atomically
 from truepath.model import CalibratedModel
 from truepath.poe import parameter_names
 from truepath.robot import NominalRobot
+from truepath.same_robot import require_same_robot
 
 SCHEMA: Literal["truepath.calibration/1"] = "truepath.calibration/1"
 MAX_BYTES = 256 << 20
@@ -113,7 +114,7 @@ def load_calibration(path: str | Path, robot: NominalRobot | None = None) -> Cal
 
     Args:
         path: the file.
-        robot: if given, the calibration must be one of this robot.
+        robot: if given, the calibration must be one of this robot, by its geometry: see ``same_robot``.
 
     Raises:
         InputError: missing, truncated, tampered with, of a newer schema, or of another robot.
@@ -143,13 +144,8 @@ def load_calibration(path: str | Path, robot: NominalRobot | None = None) -> Cal
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"the calibration is not valid at {place or 'top level'}: {first['msg']}", file=path) from None
-    if robot is not None and robot.model_sha256 != calibration.robot.model_sha256:
-        raise InputError(
-            "the calibration belongs to another robot",
-            file=path,
-            expected=f"{robot.name} with nominal model {robot.model_sha256[:12]}",
-            found=f"{calibration.robot.name} with nominal model {calibration.robot.model_sha256[:12]}",
-        )
+    if robot is not None:
+        require_same_robot(robot, calibration.model.robot, file=path)
     return calibration
 
 

@@ -47,7 +47,10 @@ class Pose(Part):
 
 
 class RobotPart(Part):
-    """The nominal robot, as it was read from its Drake plant. Limits are null where the model has none."""
+    """The nominal robot, as it was read from its Drake plant. Limits are null where the model has none.
+
+    ``source`` is the built-in name or file that it was read from; ``plants.HOSTS_PLANT`` where there was no file.
+    """
 
     name: str
     source: str

@@ -22,20 +22,24 @@ FLOOR_WIDTH_M, FLOOR_DEPTH_M = 40.0, 4.0
 UNBOUNDED_M = 1e9
 
 
-def floors_as_boxes(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
-    """Makes a large box of every half space: Drake measures no distance from one to most other shapes.
+def floors_as_boxes(plant: MultibodyPlant, scene_graph: SceneGraph, context: Context | None = None) -> None:
+    """Makes a large box of every half space of a plant: Drake measures no distance from one to most other shapes.
 
-    To be called before the diagram of a finalized plant is built.
+    Args:
+        context: of the scene graph, in which alone that is so; None: in the scene graph itself, to be called before the
+            diagram of the finalized plant is built.
     """
     from pydrake.geometry import Box, HalfSpace, Role
     from pydrake.math import RigidTransform
 
-    inspector = scene_graph.model_inspector()
+    inspector, source = scene_graph.model_inspector(), plant.get_source_id()
+    where = () if context is None else (context,)
     box = Box(FLOOR_WIDTH_M, FLOOR_WIDTH_M, FLOOR_DEPTH_M)
     for geometry in inspector.GetAllGeometryIds(Role.kProximity):
-        if isinstance(inspector.GetShape(geometry), HalfSpace):
+        own = inspector.BelongsToSource(geometry, source)
+        if own and isinstance(inspector.GetShape(geometry), HalfSpace):
             X_FG = inspector.GetPoseInFrame(geometry) @ RigidTransform([0, 0, -FLOOR_DEPTH_M / 2])
-            scene_graph.ChangeShape(plant.get_source_id(), geometry, box, X_FG)
+            scene_graph.ChangeShape(*where, source, geometry, box, X_FG)
 
 
 def place_robot(model: CalibratedModel, plant: MultibodyPlant, context: Context, arm: Arm) -> None:
@@ -107,14 +111,16 @@ class GeometryPairs:
     reach_m: Array
 
     @classmethod
-    def of(cls, plant: MultibodyPlant, scene_graph: SceneGraph, context: Context, arm: Arm) -> GeometryPairs:
+    def of(cls, plant: MultibodyPlant, inspector: SceneGraphInspector, context: Context, arm: Arm) -> GeometryPairs:
         """All pairs that Drake does not filter (it leaves out neighbours in the chain) and that the arm moves.
+
+        Shapes that are not of this plant are left out.
 
         A joint j between the shapes carries the outer one about its axis; no point of that is further from the axis
         than its own size plus the links on the way there. The same holds for the inner one, seen from the outer: the
         smaller of the two bounds is taken. Distances change by no more than points move, joint after joint.
         """
-        inspector, n = scene_graph.model_inspector(), len(arm.joints)
+        n = len(arm.joints)
         for joint in arm.joints:
             joint.set_angle(context, 0.0)
         origin = np.array([joint.frame_on_parent().CalcPoseInWorld(context).translation() for joint in arm.joints])
@@ -123,6 +129,8 @@ class GeometryPairs:
         ids, names, rows = [], [], []
         for pair in sorted(inspector.GetCollisionCandidates(), key=lambda pair: [g.get_value() for g in pair]):
             bodies = [plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)) for geometry in pair]
+            if None in bodies:
+                continue
             inner, outer = sorted(range(2), key=lambda k: carrier[int(bodies[k].index())])
             a, b = (carrier[int(bodies[k].index())] for k in (inner, outer))
             if a == b:

@@ -26,12 +26,11 @@ from typing import Any
 
 import numpy as np
 
-from truepath import plants
-from truepath.arm import locate_arm
-from truepath.cell_geometry import GeometryPairs, floors_as_boxes, place_robot
+from truepath.cell_geometry import GeometryPairs
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.model import CalibratedModel
+from truepath.posed_cell import CellOfAFile, Surroundings
 
 RANGE_M = 0.011  # where a clearance starts to matter and by how much it may shrink, see ``closer``
 SAME_M = 2e-6  # a distance that cannot have changed by more is not measured again
@@ -80,34 +79,25 @@ class Cell:
     """A cell in Drake in which a calibrated robot stands and moves.
 
     Args:
-        spec: built-in name, URDF or directives; of a built-in robot the cell that comes with it.
+        cell: built-in name, URDF or directives, of a built-in robot the cell that comes with it; or ``Surroundings``.
         model: the calibrated robot, or ``nominal_model(robot)`` for the drawing.
 
     Raises:
         InputError: no such cell, the arm in it is not the calibrated one, or it has no shapes that can collide.
     """
 
-    def __init__(self, spec: str | Path, model: CalibratedModel) -> None:
-        from pydrake.systems.framework import DiagramBuilder
-
-        self.spec, self.model = plants.cell_of(spec), model
-        builder = DiagramBuilder()
-        self._plant, self._scene_graph = plants.add_cell(builder, self.spec)
-        floors_as_boxes(self._plant, self._scene_graph)
-        # A context belongs to its diagram; both must live as long as this.
-        self._diagram = builder.Build()
-        self._root = self._diagram.CreateDefaultContext()
-        self._context = self._plant.GetMyMutableContextFromRoot(self._root)
-        self._port = self._plant.get_geometry_query_input_port()
-        arm = locate_arm(self._plant)
-        place_robot(model, self._plant, self._context, arm)
-        self._positions = self._plant.GetPositions(self._context)
-        self._of_arm = [joint.position_start() for joint in arm.joints]
-        pairs = GeometryPairs.of(self._plant, self._scene_graph, self._context, arm)
+    def __init__(self, cell: str | Path | Surroundings, model: CalibratedModel) -> None:
+        surroundings = CellOfAFile(cell) if isinstance(cell, (str, Path)) else cell
+        self.model, self._posed = model, surroundings.with_robot(model)
+        posed = self._posed
+        self._positions = posed.plant.GetPositions(posed.context)
+        self._of_arm = [joint.position_start() for joint in posed.arm.joints]
+        self._file = surroundings.file
+        pairs = GeometryPairs.of(posed.plant, posed.inspector, posed.context, posed.arm)
         if not pairs.ids:
             raise InputError(
                 "nothing in this cell can collide",
-                file=plants.resolve(self.spec),
+                file=self._file,
                 expected="collision geometry on the robot and around it",
             )
         self._pairs = self._without_what_always_touches(pairs)
@@ -121,6 +111,28 @@ class Cell:
     def is_free(self, q_rad: Array) -> bool:
         """Whether the arm at commanded joints ``(n,)`` touches neither itself nor the cell."""
         return not self.clearances(np.atleast_2d(q_rad), range_m=0.0).by_pair_m.size
+
+    @property
+    def default_joints(self) -> Array:
+        """``(n,)`` the posture in which the model stands by default, rad."""
+        return self._posed.plant.GetDefaultPositions()[self._of_arm]
+
+    def query_at(self, q_rad: Array) -> Any:
+        """Drake's query object for the arm at commanded joints ``(n,)``; valid until the next question."""
+        return self._at(self.model.true_joints(np.atleast_2d(q_rad))[0])
+
+    def collides(self, q_rad: Array) -> Array:
+        """``(N,)`` whether the arm at commanded joints ``(N, n)`` touches itself or the cell.
+
+        Ten times as fast as to ask for distances, for whoever has thousands of unrelated postures.
+        """
+        phi = self.model.true_joints(np.asarray(q_rad, float))
+        return np.array([self._asked(angles, self._touching) for angles in phi], bool).reshape(len(phi))
+
+    def _touching(self, query: Any) -> bool:
+        if not query.HasCollisions():
+            return False
+        return any(_key(pair.id_A, pair.id_B) in self._index for pair in query.ComputePointPairPenetration())
 
     def clearances(self, q_rad: Array, range_m: float = RANGE_M) -> Clearances:
         """Distances along commanded joints ``(N, n)``.
@@ -166,9 +178,7 @@ class Cell:
                 return question(self._at(phi + nudge))
             except RuntimeError as error:
                 problem = str(error)
-        raise InputError(
-            "Drake cannot tell a distance in this cell", file=plants.resolve(self.spec), found=problem[:300]
-        )
+        raise InputError("Drake cannot tell a distance in this cell", file=self._file, found=problem[:300])
 
     def _distance(self, query: Any, g: int) -> float:
         return float(query.ComputeSignedDistancePairClosestPoints(*self._pairs.ids[g]).distance)
@@ -176,8 +186,8 @@ class Cell:
     def _at(self, phi: Array) -> Any:
         """Drake's query object for the true angles ``(n,)``."""
         self._positions[self._of_arm] = phi
-        self._plant.SetPositions(self._context, self._positions)
-        return self._port.Eval(self._context)
+        self._posed.plant.SetPositions(self._posed.context, self._positions)
+        return self._posed.query()
 
     def _nearby(self, query: Any, distance_m: float) -> list[tuple[int, float]]:
         """All watched pairs up to a distance apart."""

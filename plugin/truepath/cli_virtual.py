@@ -48,9 +48,13 @@ def simulate(
 def demo(
     folder: Annotated[Path, typer.Option("--folder", help="where the results go")] = Path("truepath-demo"),
     seed: Annotated[int, typer.Option(help="of the virtual robot's hidden errors")] = 0,
+    show: Annotated[
+        bool | None,
+        typer.Option("--open/--no-open", help="open the preview in a browser; default: where somebody looks on"),
+    ] = None,
 ) -> None:
     """Run everything on the built-in virtual cell: simulate, diagnose, validate, correct, preview."""
-    from truepath import console
+    from truepath import browser, console
     from truepath.demo import run_demo
 
     with console.progress("demo") as say:
@@ -62,6 +66,10 @@ def demo(
         f"{result.after_mm.mean():.3f} mm corrected "
         f"({result.before_mm.mean() / result.after_mm.mean():.0f} times better)"
     )
-    console.out.print("open in a browser:")
-    console.out.print(f"  {result.report.resolve()}  what is wrong with the robot, and why")
+    wanted = browser.somebody_looks_on() if show is None else show
+    opened = wanted and browser.open_page(result.preview)
+    if show and not opened:
+        console.warn("no browser could be started")
+    console.out.print("the preview is open in a browser:" if opened else "open in a browser:")
     console.out.print(f"  {result.preview.resolve()}  the path, as programmed and corrected")
+    console.out.print(f"  {result.report.resolve()}  what is wrong with the robot, and why")

@@ -28,6 +28,7 @@ from truepath.virtual.visits import Visits
 CELL = "ur5_cell"
 HIDDEN = ("joint_compliance", "transmission_error")  # besides errors of the frames
 POSES, FRESH_POSES, NOISE_MM = 300, 200, 0.02
+REPORT = "report.html"  # as ``write_diagnosis`` calls it
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,7 @@ def run_demo(folder: Path, seed: int, say: Callable[[str], None]) -> DemoResult:
         controller_of(calibration.model.robot),
         robot_source=CELL,
         title="weld_path.csv on the virtual UR5",
+        report=REPORT,
     )
     validation = validate(calibration.model, fresh)
-    return DemoResult(diagnosis.verdict, validation, before, after, folder / "report.html", preview)
+    return DemoResult(diagnosis.verdict, validation, before, after, folder / REPORT, preview)

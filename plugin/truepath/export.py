@@ -17,6 +17,8 @@ from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.lie import Array
 from truepath.model import CalibratedModel
+from truepath.mounts import Mount, mounts_on_the_way
+from truepath.same_robot import require_same_robot
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
@@ -62,12 +64,13 @@ def set_calibrated_frames(
     from truepath.robot import describe_arm
 
     arm = locate_arm(plant, model_instance=model_instance, flange_frame=flange_frame)
-    robot = describe_arm(plant, arm)
-    if robot.model_sha256 != model.robot.model_sha256:
+    require_same_robot(model.robot, describe_arm(plant, arm), "the plant's arm is not the calibrated robot")
+    if flange_mount(plant, arm) is None:
         raise InputError(
-            "the plant's arm is not the calibrated robot",
-            expected=f"{model.robot.name}, nominal model {model.robot.model_sha256[:12]}",
-            found=f"{robot.name}, nominal model {robot.model_sha256[:12]}",
+            f"the flange {arm.flange.name()!r} cannot be moved in a context",
+            expected="a flange that hangs on the last link by a FixedOffsetFrame, as Drake's URDF parser makes for the "
+            "origin of every joint",
+            found="the frame of a body; give the flange a frame of its own",
         )
     move_arm_frames(model, plant, arm, context)
 
@@ -76,6 +79,8 @@ def move_arm_frames(
     model: CalibratedModel, plant: MultibodyPlant, arm: Arm, context: Context, *, X_BB: Array | None = None
 ) -> None:
     """The same for an arm that was found already and is the calibrated robot.
+
+    A flange without a mount stays as drawn on the last link, whose axis is set.
 
     Args:
         X_BB: ``(4, 4)`` where the base stands, seen from where its body stands in the plant, which itself is not
@@ -87,55 +92,56 @@ def move_arm_frames(
 
     X_BB = np.eye(4) if X_BB is None else X_BB
     zero = zero_context(plant, arm)
-    X_BW = lie.invert(arm.base.CalcPoseInWorld(zero).GetAsMatrix4())
+    X_WB = arm.base.CalcPoseInWorld(zero).GetAsMatrix4()
     # All of a link moves with its axis; in the link's own coordinates only the difference of two motions remains.
-    motion_of_body = np.eye(4)
-    for frame, motion in zip(arm_frames(plant, arm), [*(X_BB @ joint_motions(model)), X_BB], strict=True):
-        X_BBody = X_BW @ frame.body().body_frame().CalcPoseInWorld(zero).GetAsMatrix4()
+    motion_of_body, found = np.eye(4), []
+    for frame, motion in zip(joint_frames(arm), X_BB @ joint_motions(model), strict=True):
+        X_BBody = lie.invert(X_WB) @ frame.body().body_frame().CalcPoseInWorld(zero).GetAsMatrix4()
         X_BodyF = frame.CalcPoseInBodyFrame(zero).GetAsMatrix4()
         X_PF = frame.GetPoseInParentFrame(zero).GetAsMatrix4()
         X_BodyF_moved = lie.invert(motion_of_body @ X_BBody) @ motion @ X_BBody @ X_BodyF
         X_PF_moved = X_PF @ lie.invert(X_BodyF) @ X_BodyF_moved
         X_PF_moved[:3, :3] = lie.nearest_rotation(X_PF_moved[:3, :3])
-        frame.SetPoseInParentFrame(context, RigidTransform(X_PF_moved))
+        found.append((frame, RigidTransform(X_PF_moved)))
         motion_of_body = motion
+    for frame, X_PF_new in found:
+        for each in (zero, context):
+            frame.SetPoseInParentFrame(each, X_PF_new)
+    mount = flange_mount(plant, arm)
+    if mount is not None:
+        X_WF = arm.flange.CalcPoseInWorld(zero).GetAsMatrix4()
+        mount.move(zero, X_WB @ X_BB @ model.robot.X_BF @ lie.invert(X_WF))
+        mount.frame.SetPoseInParentFrame(context, mount.frame.GetPoseInParentFrame(zero))
 
 
-def arm_frames(plant: MultibodyPlant, arm: Arm) -> list[FixedOffsetFrame]:
-    """The n + 1 frames that a calibration moves: of the joints, and that by which the flange hangs on the last link.
+def joint_frames(arm: Arm) -> list[FixedOffsetFrame]:
+    """The n frames of the joints that a calibration moves.
 
     Raises:
         InputError: one of them cannot be moved in a context.
     """
-    return [_movable(joint.frame_on_parent()) for joint in arm.joints] + [_movable(_flange_mount(plant, arm))]
-
-
-def _flange_mount(plant: MultibodyPlant, arm: Arm) -> Any:
-    """The frame through which the flange hangs on the last link."""
-    from pydrake.multibody.tree import JointIndex
-
-    from truepath.arm import inboard_joints
-
-    last_link = arm.joints[-1].child_body().index()
-    if arm.flange.body().index() == last_link:
-        return arm.flange
-    inboard = inboard_joints(plant)
-    joint = plant.get_joint(JointIndex(inboard[int(arm.flange.body().index())]))
-    while joint.parent_body().index() != last_link:
-        joint = plant.get_joint(JointIndex(inboard[int(joint.parent_body().index())]))
-    return joint.frame_on_parent()
-
-
-def _movable(frame: Any) -> FixedOffsetFrame:
     from pydrake.multibody.tree import FixedOffsetFrame
 
-    if not isinstance(frame, FixedOffsetFrame):
-        raise InputError(
-            f"frame {frame.name()!r} cannot be moved in a context",
-            expected="a FixedOffsetFrame, as Drake's URDF parser makes for the origin of every joint",
-            found="the frame of a body; give the flange a frame of its own",
-        )
-    return frame
+    for joint in arm.joints:
+        if not isinstance(joint.frame_on_parent(), FixedOffsetFrame):
+            raise InputError(
+                f"joint {joint.name()!r} cannot be moved in a context",
+                expected="a joint on a FixedOffsetFrame of the link before it, as Drake's URDF parser makes for the "
+                "origin of every joint; plant.AddJoint(RevoluteJoint(name, that frame, ...)) takes one",
+                found=f"one right on the frame of body {joint.frame_on_parent().name()!r}",
+            )
+    return [joint.frame_on_parent() for joint in arm.joints]
+
+
+def flange_mount(plant: MultibodyPlant, arm: Arm) -> Mount | None:
+    """By what the flange hangs on the axis of the last joint, if that can be moved."""
+    from pydrake.multibody.tree import FixedOffsetFrame
+
+    last = arm.joints[-1]
+    mounts = mounts_on_the_way(plant, arm.flange, last.child_body())
+    if not mounts and isinstance(last.frame_on_child(), FixedOffsetFrame):
+        mounts = [Mount(last.frame_on_child(), last.child_body(), on_held=True)]
+    return mounts[0] if mounts else None
 
 
 # --- a URDF ---------------------------------------------------------------------------------------------

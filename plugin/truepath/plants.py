@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.systems.framework import DiagramBuilder
 
+HOSTS_PLANT = "a host's plant"  # stands for a source where the plant of a host was never a file
+
 BUILT_IN = {
     "ur5": "ur5/ur5.urdf",
     "ur10": "ur10/ur10.urdf",
@@ -37,6 +39,12 @@ def resolve(spec: str | Path) -> Path:
     """
     if str(spec) in BUILT_IN:
         return models_dir() / BUILT_IN[str(spec)]
+    if str(spec) == HOSTS_PLANT:
+        raise InputError(
+            "this calibration was made on a host's own plant in memory, so it names no file of the robot",
+            expected="--robot with the URDF or directives of that robot; or robot_source=, given to the host's "
+            "CalibrationPlugin before it saves",
+        )
     path = Path(spec)
     try:
         exists, is_file = path.exists(), path.is_file()

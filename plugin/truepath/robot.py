@@ -67,7 +67,11 @@ class NominalRobot:
 
     @property
     def model_sha256(self) -> str:
-        """Hash of the nominal kinematics, to the nanometre; limits, masses and the place in the world do not enter."""
+        """Hash of the nominal kinematics, to the nanometre, and of the joints' names.
+
+        Limits, masses and the place in the world do not enter. It seals a calibration file; whether a calibration fits
+        a robot is asked of the geometry alone (``same_robot``).
+        """
         rounded = [
             (np.round(part, 9) + 0.0).tolist()  # + 0.0 turns -0.0 into 0.0
             for part in (self.screws_B, self.X_BF)

@@ -1,5 +1,6 @@
 import pytest
 from foreign_host import RealCell, build_plant, calibrated, plugin_for
+from live_host import Browser, make_host, start_meshcat
 
 
 @pytest.fixture(scope="session")
@@ -42,3 +43,32 @@ def soft(plant, soft_cell):
 def fresh(plant):
     """A plugin without a calibration."""
     return plugin_for(plant)
+
+
+@pytest.fixture(scope="session")
+def meshcat():
+    """The host's, with something of its own in it."""
+    return start_meshcat()
+
+
+@pytest.fixture(scope="session")
+def host(meshcat, rigid_cell):
+    """A diagram of the host that draws itself, and the plugin for its right arm, which does not know the shapes."""
+    return make_host(meshcat, rigid_cell)
+
+
+@pytest.fixture
+def browser(meshcat):
+    """What a browser would send, and what it was told."""
+    return Browser(meshcat)
+
+
+@pytest.fixture
+def operate(host):
+    """Function: shows a path and gives the controls."""
+
+    def operate(program, **options):
+        return host.plugin.operate(program, scene_graph=host.scene_graph, **options)
+
+    yield operate
+    host.plugin.remove()

@@ -37,8 +37,11 @@ def urdf_with_camera():
     return re.sub(r'(\n  <joint name="elbow_joint")', lambda match: CAMERA + match.group(1), text, count=1)
 
 
-def build_plant(plant=None):
-    """A finalized plant. Model instances ``left``, ``right`` (the arms), ``left_tool`` and ``right_tool``."""
+def build_plant(plant=None, furnish=lambda plant: None):
+    """A finalized plant. Model instances ``left``, ``right`` (the arms), ``left_tool`` and ``right_tool``.
+
+    ``furnish`` may add to it before.
+    """
     plant = MultibodyPlant(0.0) if plant is None else plant
     plant.AddRigidBody("box", SpatialInertia.SolidCubeWithDensity(500.0, 0.1))
     for name in ("left", "right"):
@@ -59,6 +62,7 @@ def build_plant(plant=None):
             holder = plant.AddFrame(FixedOffsetFrame("gripper_mount", flange, X_FG))
             plant.WeldFrames(holder, gripper.body_frame())
         plant.AddFrame(FixedOffsetFrame("tcp", gripper.body_frame(), X_GT, tool))
+    furnish(plant)
     plant.Finalize()
     return plant
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import truepath.host
 from foreign_host import CORNERS, JOINTS, X_GT, X_WM, arm_instance, build_plant, path, some_joints
-from pydrake.geometry import StartMeshcat
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, SpatialInertia
@@ -229,42 +228,6 @@ def test_a_trajectory_is_corrected_as_the_joints_in_it_are(rigid, rigid_cell, dr
     whole = PiecewisePolynomial.ZeroOrderHold([0.0, 1.0], np.zeros((rigid.plant.num_positions(), 2)))
     with pytest.raises(InputError, match=r"in the order of plugin\.arm"):
         rigid.correct(whole)
-
-
-# Preview
-
-
-def test_the_paths_are_drawn_in_the_hosts_meshcat(plant, rigid, rigid_cell, drawn):
-    meshcat = StartMeshcat()
-    meshcat.SetTransform("/of_the_host", RigidTransform())
-    plugin = CalibrationPlugin(plant, model_instance="right::ur5", tool_frame="tcp", meshcat=meshcat)
-    plugin.use(rigid.calibration)
-    shown = plugin.preview(path(30), magnification=1.0)
-    for name in ("programmed", "real", "corrected"):
-        assert meshcat.HasPath(f"/truepath/{name}")
-    assert meshcat.HasPath("/of_the_host")
-    ends = path(30)[[0, -1]]
-    assert np.abs(shown.programmed[[0, -1]] - drawn.poses(ends)[:, :3, 3]).max() < 1e-9
-    assert np.abs(shown.real[[0, -1]] - rigid_cell.poses(ends)[:, :3, 3]).max() < 5e-5
-    assert shown.corrected_mm.max < 1e-3 < 0.5 < shown.real_mm.mean
-    larger = plugin.preview(path(30), magnification=20.0)
-    assert np.allclose(larger.real - larger.programmed, 20 * (shown.real - shown.programmed), atol=1e-12)
-    assert plugin.preview(path(30)[:1]).programmed.shape == (1, 3)
-    trajectory = PiecewisePolynomial.CubicShapePreserving(np.linspace(0.0, 4.0, len(CORNERS)), CORNERS.T, True)
-    assert plugin.preview(trajectory, magnification=1.0).corrected_mm.max < 1e-3
-
-
-def test_the_preview_can_be_a_page(rigid, tmp_path):
-    summary = rigid.preview(path(10), output=tmp_path / "path.html", robot_source="ur5")
-    assert summary.waypoints == 10
-    assert (tmp_path / "path.html").stat().st_size > 1e5
-    with pytest.raises(InputError, match="shapes"):
-        rigid.preview(path(10), output=tmp_path / "other.html")
-
-
-def test_without_a_meshcat_or_a_page_there_is_no_preview(rigid):
-    with pytest.raises(InputError, match="nothing to draw in"):
-        rigid.preview(path(10))
 
 
 # What does not make sense

@@ -5,24 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from foreign_host import CORNERS, JOINTS, X_FG, X_GT, RealTool, arm_instance, path, some_joints
-from hand_made_networks import residual_about
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+from foreign_host import CORNERS, JOINTS, RealTool, arm_instance, path
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
+from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
-from truepath.correct import MAX_JOINT_CORRECTION_RAD, correct
-from truepath.effects.base import EffectParameter, FittedTerm, Term
+from truepath.correct import MAX_JOINT_CORRECTION_RAD
 from truepath.errors import InputError
-from truepath.host import CalibratedRobot, CalibrationPlugin, JointCorrection, JointCorrection_
-from truepath.host.one_pose import OnePose
-from truepath.host.one_pose_networks import network_shift
-from truepath.host.placed_robot import PlacedRobot
+from truepath.host import CalibratedRobot, JointCorrection
 from truepath.host.steady_correction import SteadyCorrection
 from truepath.kinematics.corrected_joints import corrected_joints
-from truepath.model import nominal_model
-from truepath.motions import Moves
 
 
 def output(system, name, value):
@@ -227,123 +219,6 @@ def test_wrong_words_and_missing_calibrations_are_refused(rigid, fresh):
             make()
 
 
-# One pose at a time
-
-
-def waves(joint, amplitude, limits=(-2.0, 2.0)):
-    rng = np.random.default_rng(joint)
-    names = [f"{wave} {k}" for k in (1, 3, 9) for wave in ("cos", "sin")]
-    term = Term(
-        "transmission_error",
-        Moves.JOINT,
-        joint,
-        ("theta",),
-        (("lower_rad", limits[0]), ("upper_rad", limits[1])),
-        tuple(EffectParameter(name, "rad", 0.0, "") for name in names),
-    )
-    return FittedTerm(term, rng.normal(scale=amplitude, size=len(names)))
-
-
-def one(effect, moves, joint, inputs, constants, *parameters):
-    names = tuple(EffectParameter(name, unit, 0.0, "") for name, unit, _ in parameters)
-    return FittedTerm(Term(effect, moves, joint, inputs, constants, names), np.array([v for *_, v in parameters]))
-
-
-ALL = (("lower_rad", -2.0), ("upper_rad", 2.0))
-EFFECTS = {
-    "none": (),
-    "waves": tuple(waves(joint, 3e-5) for joint in range(1, 7)),
-    "compliance": tuple(
-        one("joint_compliance", Moves.JOINT, joint, ("gravity_torque",), ALL, ("compliance", "rad/(N m)", 4e-5))
-        for joint in (2, 3)
-    ),
-    "backlash": (
-        one(
-            "backlash",
-            Moves.JOINT,
-            2,
-            ("gravity_torque",),
-            (*ALL, ("soft_torque", 2.0)),
-            ("width", "rad", 3e-4),
-        ),
-    ),
-    "wobble": (
-        one("axis_wobble", Moves.AXIS, 1, ("theta",), ALL, ("x cos 1", "m", 1e-4), ("rx sin 2", "rad", 2e-4)),
-        one("axis_wobble", Moves.AXIS, 4, ("theta",), ALL, ("z sin 3", "m", 5e-5), ("ry cos 1", "rad", -1e-4)),
-    ),
-    "growth": (
-        one(
-            "thermal_expansion",
-            Moves.ROBOT_LENGTHS,
-            None,
-            ("temperature_c",),
-            (("reference_c", 20.0), ("default temperature_c", 27.0)),
-            ("expansion", "1/K", 1.2e-5),
-        ),
-    ),
-}
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_one_pose_is_solved_as_a_path_is_with_every_effect(name, rigid):
-    """By the model's own forward kinematics, which are tested elsewhere."""
-    model = replace(rigid.calibration.model, effects=EFFECTS[name], payload_kg=1.5)
-    plain = replace(rigid.calibration.model, payload_kg=1.5)
-    solver, q = OnePose(model), some_joints(40, 3)
-    usable = np.array([np.linalg.svd(model.flange_poses_and_jacobian(row)[1][0])[1][-1] for row in q]) > 0.05
-    found = [solver.solve(row) for row in q[usable]]
-    assert usable.sum() > 15
-    assert all(each.converged for each in found)
-    solved = np.array([each.q_rad for each in found])
-    goal = PlacedRobot.of(rigid).programmed_tool_poses(q[usable])
-    X_WB = rigid.robot.X_WB @ np.linalg.inv(model.X_MB_nominal) @ model.X_MB
-    reached = X_WB @ model.flange_poses(solved) @ PlacedRobot.of(rigid).X_FT_real
-    assert np.abs(reached - goal).max() < 3e-9
-    expected = corrected_joints(model, q[usable], exact_below=0.0)
-    assert np.abs(solved - expected.q_rad).max() < 1e-7
-    assert np.abs([1e3 * each.displacement_m for each in found] - expected.displacement_mm).max() < 1e-5
-    if name != "none":
-        assert np.abs(solved - corrected_joints(plain, q[usable], exact_below=0.0).q_rad).max() > 1e-5
-
-
-def test_an_arm_with_a_joint_too_many_takes_the_shortest_step(seven):
-    p = np.zeros(40)
-    p[:28] = np.random.default_rng(0).normal(scale=5e-4, size=28)
-    model = replace(nominal_model(seven), p=p)
-    q = np.random.default_rng(1).uniform(0.7 * seven.lower_rad, 0.7 * seven.upper_rad, (20, 7))
-    solver, expected = OnePose(model), corrected_joints(model, q, exact_below=0.0)
-    assert np.abs([solver.solve(row).q_rad for row in q] - expected.q_rad).max() < 1e-7
-    assert np.abs(expected.q_rad - q).max() > 1e-4
-
-
-def test_an_arm_with_too_few_joints_is_refused(rigid):
-    robot = replace(rigid.robot, joint_names=rigid.robot.joint_names[:5])
-    with pytest.raises(InputError, match="six or more"):
-        SteadyCorrection(replace(rigid.calibration.model, robot=robot))
-
-
-@pytest.mark.parametrize("outputs", [3, 6])
-def test_networks_say_of_one_pose_what_they_say_of_many(outputs):
-    residual = residual_about(CORNERS[0], outputs=outputs)
-    q = CORNERS[0] + np.random.default_rng(0).normal(scale=0.3, size=(300, 6))
-    expected, function = residual.shift(q), network_shift(residual)
-    assert (np.abs(expected).max(axis=1) == 0).any()
-    assert (np.abs(expected).max(axis=1) > 1e-5).any()
-    assert np.abs(np.array([np.array(function(row))[:, 0] for row in q]) - expected).max() < 1e-12
-
-
-@pytest.mark.parametrize("outputs", [3, 6])
-def test_networks_are_in_it(outputs, rigid):
-    centre = CORNERS[0]
-    q = centre + np.linspace(0.0, 0.8, 30)[:, None] * np.array([1.0, 0.5, -0.5, 0.3, 0.1, 0.7])  # out of their reach
-    model = rigid.calibration.model.with_residual(residual_about(centre, outputs=outputs))
-    solved = np.array([SteadyCorrection(model)(row).q_rad for row in q])
-    assert np.abs(solved - correct(model, q).q_rad).max() < 1e-7
-    without = np.abs(solved - correct(rigid.calibration.model, q).q_rad).max(axis=1)
-    assert without[0] > 1e-5
-    assert without[-1] < 1e-7
-
-
 def test_one_evaluation_is_fast_enough_for_a_control_loop(rigid):
     """Some 60 us where nobody else is working; the bound leaves room for whoever is."""
     system = JointCorrection(rigid)
@@ -355,104 +230,3 @@ def test_one_evaluation_is_fast_enough_for_a_control_loop(rigid):
         port.Eval(context)
         took.append(time.perf_counter() - start)
     assert np.median(took) < 5e-4
-
-
-# The predicted robot
-
-
-def test_the_predicted_tool_is_that_of_the_real_robot(soft, soft_cell):
-    system = CalibratedRobot(soft)
-    for q in path(10):
-        assert np.linalg.norm(output(system, "tool_pose", q).translation() - soft_cell.poses(q)[0, :3, 3]) < 0.05e-3
-
-
-def test_with_measured_orientations_it_is_turned_like_the_real_one(fresh, soft_cell):
-    q = some_joints(80, 7)
-    poses = soft_cell.poses(q)
-    fresh.calibrate(fresh.measurements(q, poses[:, :3, 3], poses[:, :3, :3]), effects=("joint_compliance",))
-    system = CalibratedRobot(fresh)
-    for q, real in zip(path(10), soft_cell.poses(path(10)), strict=True):
-        tool, flange = (output(system, name, q).GetAsMatrix4() for name in ("tool_pose", "flange_pose"))
-        assert np.abs(tool - real).max() < 1e-5
-        model = fresh.calibration.model
-        mounted = model.X_FE @ np.linalg.inv(model.X_FE_nominal) @ X_FG.GetAsMatrix4() @ X_GT.GetAsMatrix4()
-        assert np.abs(flange @ mounted - tool).max() < 1e-12
-
-
-def test_it_takes_all_positions_of_the_plant_too(plant, rigid):
-    q = np.zeros(plant.num_positions())
-    q[rigid.arm] = CORNERS[0]
-    whole = output(CalibratedRobot(rigid, of="plant"), "tool_pose", q)
-    assert whole.IsExactlyEqualTo(output(CalibratedRobot(rigid), "tool_pose", CORNERS[0]))
-
-
-def test_without_errors_it_is_the_drawing(ur5, rigid):
-    plugin = CalibrationPlugin(rigid.plant, model_instance="left::ur5")
-    flange = rigid.plant.GetFrameByName("flange", arm_instance(rigid.plant, "left"))
-    context = rigid.plant.CreateDefaultContext()
-    positions = rigid.plant.GetPositions(context)
-    positions[plugin.arm] = CORNERS[0]
-    rigid.plant.SetPositions(context, positions)
-    placed = PlacedRobot(nominal_model(ur5), rigid.calibration.region.region(), plugin.robot.X_WB, np.eye(4))
-    predicted = output(CalibratedRobot(placed), "flange_pose", CORNERS[0])
-    assert predicted.IsNearlyEqualTo(flange.CalcPoseInWorld(context), 1e-12)
-
-
-# Scalars
-
-
-def diagram_of(system):
-    builder = DiagramBuilder()
-    builder.AddNamedSystem("system", system)
-    source = builder.AddSystem(ConstantVectorSource(CORNERS[0]))
-    builder.Connect(source.get_output_port(), system.get_input_port(0))
-    builder.ExportOutput(system.get_output_port(0))
-    return builder.Build()
-
-
-@pytest.mark.parametrize("make", [JointCorrection, CalibratedRobot])
-def test_a_diagram_with_it_can_be_cloned_and_converted_to_derivatives(make, rigid):
-    diagram = diagram_of(make(rigid))
-    value = diagram.get_output_port(0).Eval(diagram.CreateDefaultContext())
-    clone = diagram.Clone()
-    again = clone.get_output_port(0).Eval(clone.CreateDefaultContext())
-    assert np.array_equal(value, again) if make is JointCorrection else value.IsExactlyEqualTo(again)
-    converted = diagram.ToAutoDiffXd()
-    converted.get_output_port(0).Eval(converted.CreateDefaultContext())
-    with pytest.raises(RuntimeError, match="does not support scalar conversion"):
-        diagram.ToSymbolic()
-
-
-def test_derivatives_of_the_corrected_joints_are_those_of_a_path(soft):
-    q, direction = CORNERS[1], np.array([0.3, -0.2, 0.5, 0.1, 0.4, -0.6])
-    system = JointCorrection(soft).ToAutoDiffXd()
-    assert isinstance(system, JointCorrection_[AutoDiffXd])
-    found = output(system, "corrected", InitializeAutoDiff(q, direction[:, None]).ravel())
-    h = 1e-3
-    slope = (soft.correct(q + h * direction).q_rad[0] - soft.correct(q - h * direction).q_rad[0]) / (2 * h)
-    assert np.abs(ExtractGradient(found)[:, 0] - slope).max() < 1e-5
-    assert np.abs(slope - direction).max() > 1e-5
-    assert output(system, "valid", InitializeAutoDiff(q).ravel())[0].value() == 1.0
-    assert output(system, "inside", InitializeAutoDiff(q).ravel())[0].value() == 1.0
-
-
-def test_derivatives_of_the_predicted_pose(soft):
-    q = CORNERS[1]
-    pose = output(CalibratedRobot(soft).ToAutoDiffXd(), "flange_pose", InitializeAutoDiff(q).ravel())
-    jacobian = ExtractGradient(pose.translation())
-    model = soft.calibration.model
-    rigid_part = model.flange_poses_and_jacobian(q)[1][0, 3:]
-    X_WB = PlacedRobot.of(soft).X_WB_real
-    assert np.abs(jacobian - X_WB[:3, :3] @ rigid_part).max() < 5e-3  # effects change it by parts in a thousand
-    h = 1e-4
-    for joint, unit in enumerate(np.eye(6)):
-        ahead, behind = (PlacedRobot.of(soft).flange_poses((q + s * h * unit)[None])[0] for s in (1, -1))
-        slope = (ahead - behind) / (2 * h)
-        assert np.abs(jacobian[:, joint] - slope[:3, 3]).max() < 1e-7
-        turned = np.array([[ExtractGradient(np.array([a]))[0, joint] for a in row] for row in pose.rotation().matrix()])
-        assert np.abs(turned - slope[:3, :3]).max() < 1e-7
-
-
-def test_velocities_have_no_derivatives(rigid):
-    with pytest.raises(InputError, match="no derivatives"):
-        JointCorrection(rigid, takes="state").ToAutoDiffXd()

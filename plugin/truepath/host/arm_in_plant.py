@@ -56,7 +56,9 @@ class ArmInPlant:
         if not plant.is_finalized():
             raise InputError("the plant is not finalized", expected="call plant.Finalize() first")
         instance = _instance(plant, model_instance) if isinstance(model_instance, str) else model_instance
-        arm = locate_arm(plant, model_instance=instance, base_frame=base_frame, flange_frame=flange_frame)
+        arm = locate_arm(
+            plant, model_instance=instance, base_frame=base_frame, flange_frame=flange_frame, carried=tool_frame
+        )
         if not plant.IsAnchored(arm.base.body()):
             raise InputError(
                 f"the base {arm.base.scoped_name().get_full()!r} of the arm moves",

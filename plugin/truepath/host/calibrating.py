@@ -14,7 +14,9 @@ from truepath.host.arm_in_plant import ArmInPlant
 from truepath.host.in_memory import MeasuredIn, Probe, as_measurements, stated_base, stated_probe
 from truepath.lie import Array
 from truepath.measurements import Measurements
+from truepath.plants import BUILT_IN, HOSTS_PLANT
 from truepath.robot import NominalRobot
+from truepath.same_robot import require_same_robot
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     from truepath.residual.options import Options
 
 Progress = Callable[[str], None]
-SOURCE = "a host's plant"
 FROM_THE_HOST = (
     "lower_rad",
     "upper_rad",
@@ -32,6 +33,7 @@ FROM_THE_HOST = (
     "gravity_m_s2",
     "world_base",
 )
+NAMES = ("name", "source", "joint_names")
 
 
 class Calibrating:
@@ -43,6 +45,7 @@ class Calibrating:
 
     def __init__(self, place: ArmInPlant) -> None:
         self.place = place
+        self.source = HOSTS_PLANT
         self._calibration: Calibration | None = None
 
     @property
@@ -59,6 +62,20 @@ class Calibrating:
     def calibration(self) -> Calibration | None:
         """The calibration in use; None before ``calibrate``, ``load`` or ``use``."""
         return self._calibration
+
+    def name_source(self, robot_source: str | Path) -> None:
+        """Says which file holds the arm: a built-in name, a URDF or directives. Calibrations saved from now on name it.
+
+        Raises:
+            InputError: no such file, or none with these joints in it.
+        """
+        from truepath.model_files import find_urdf
+
+        find_urdf(robot_source, self.robot.joint_names, self.robot.name)
+        is_built_in = str(robot_source) in BUILT_IN
+        self.source = str(robot_source) if is_built_in else str(Path(robot_source).resolve())
+        if self._calibration is not None:
+            self.use(self._calibration)
 
     @property
     def arm(self) -> Array:
@@ -118,7 +135,7 @@ class Calibrating:
         self,
         measurements: Measurements,
         *,
-        effects: Sequence[str] | Literal["auto"] = "auto",
+        effects: Sequence[str] | str = "auto",
         residual: Literal["none", "network"] = "none",
         seed: int = 0,
         device: str = "cpu",
@@ -128,7 +145,8 @@ class Calibrating:
 
         Args:
             measurements: from ``measurements`` or ``read_measurements``.
-            effects: names to fit besides the kinematics, or ``auto``: those that the data speaks for.
+            effects: names to fit besides the kinematics; or, as on the command line, one string: ``auto``, those that
+                the data speaks for, ``none``, or names with commas between them.
             residual: ``network`` also learns networks for what has no name, and keeps them if they help.
             seed, device: of the networks.
             progress: told in plain words what is being done.
@@ -141,7 +159,12 @@ class Calibrating:
 
         options = _networks(residual, seed, device)
         learnt = learn(
-            self.robot, self._own(measurements), effects=effects, network=options, source=SOURCE, progress=progress
+            self.robot,
+            self._own(measurements),
+            effects=_effects(effects),
+            network=options,
+            source=self.source,
+            progress=progress,
         )
         return self.use(learnt.calibration)
 
@@ -169,7 +192,7 @@ class Calibrating:
 
         options = _networks(residual, seed, device)
         return diagnose(
-            self.robot, self._own(measurements), source=SOURCE, plan=plan, network=options, progress=progress
+            self.robot, self._own(measurements), source=self.source, plan=plan, network=options, progress=progress
         )
 
     def use(self, calibration: Calibration) -> Calibration:
@@ -179,20 +202,23 @@ class Calibrating:
         those that the calibration was learnt with; by what a stated base stood off from its place there, it is taken
         to stand off here. For another payload than was measured with: ``use(calibration.carrying(kg))``.
 
+        Joints may have other names here (``left_elbow_joint``): the geometry decides, and the names become the host's.
+
         Raises:
-            InputError: it belongs to another robot.
+            InputError: it belongs to another robot; with the numbers that differ.
         """
-        if calibration.robot.model_sha256 != self.robot.model_sha256:
-            raise InputError(
-                "the calibration belongs to another robot",
-                expected=f"{self.robot.name} with nominal model {self.robot.model_sha256[:12]}",
-                found=f"{calibration.robot.name} with nominal model {calibration.robot.model_sha256[:12]}",
-            )
-        host = RobotPart.of(self.robot, SOURCE).model_dump()
+        require_same_robot(self.robot, calibration.model.robot)
+        host = RobotPart.of(self.robot, self.source).model_dump()
         own = calibration.robot.model_dump()
-        if any(own[name] != host[name] for name in FROM_THE_HOST):
+        names = NAMES if own["joint_names"] != host["joint_names"] else ()
+        if own["source"] == HOSTS_PLANT != self.source:
+            names = (*names, "source")
+        if names or any(own[name] != host[name] for name in FROM_THE_HOST):
             content = calibration.model_dump(by_alias=True)
-            content["robot"].update({name: host[name] for name in FROM_THE_HOST})
+            content["robot"].update({name: host[name] for name in (*names, *FROM_THE_HOST)})
+            # The seal of names and geometry; the geometry is that of the calibration, to the last digit.
+            named = replace(calibration.model.robot, joint_names=tuple(content["robot"]["joint_names"]))
+            content["robot"]["model_sha256"] = named.model_sha256
             calibration = Calibration.model_validate(content)
         self._calibration = calibration
         return calibration
@@ -227,6 +253,23 @@ class Calibrating:
                 found=str(measurements.q_rad.shape[1:]),
             )
         return measurements
+
+
+def _effects(effects: Sequence[str] | str) -> Sequence[str] | Literal["auto"]:
+    from truepath.effects import effect_named
+    from truepath.pipeline import named_effects
+
+    if isinstance(effects, str):
+        return named_effects(effects)
+    try:
+        names = tuple(effects)
+    except TypeError:
+        raise InputError(
+            "these are no effects", expected="auto, none, or names of effects", found=repr(effects)[:80]
+        ) from None
+    for name in names:
+        effect_named(name)
+    return names
 
 
 def _networks(residual: str, seed: int, device: str) -> Options | None:

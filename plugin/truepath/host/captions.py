@@ -1,4 +1,4 @@
-"""What the panes on the screen say: the legend above, the place and what is to be heeded there below."""
+"""What the panes on the screen say: the legend, and below it the place and what is to be heeded there."""
 
 from __future__ import annotations
 
@@ -19,18 +19,21 @@ from truepath.preview.colours import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-INK, PALE, WARNING = "#1c1c1c", "#505050", "#8a4b00"
-TEXT, SMALL = 8.5, 7.5  # points, of 1/72 inch at 100 pixels an inch: 12 and 10 pixels
-LEFT_PX, ROW_PX = 12, 19
+INK, PALE, WARNING = "#1c1c1c", "#464646", "#8a4b00"
+TEXT, SMALL = 9.6, 9.0  # points, of 1/72 inch at 100 pixels an inch: 13.3 and 12.5 pixels
+LEFT_PX, ROW_PX = 12, 20
 SWATCH_PX = 26
-LEGEND_PX, PLACE_PX = (860, 68), (860, 68)  # width and height of the panes
-KEYS = "Keys: space play/stop   ← → move   N, B next, previous warning   C colour by error   1 to 8 show/hide parts"
+WIDTH_PX = 740  # seen whole where the screen is no wider than high, and beside Meshcat's own controls on wider ones
+LEGEND_PX = (WIDTH_PX, 4 * ROW_PX + 10)
+PLACE_PX, STILL_PX = (WIDTH_PX, 3 * ROW_PX + 10), (WIDTH_PX, 2 * ROW_PX + 10)  # with controls and without
+LONGEST, LONGEST_BOLD = 98, 88  # letters that fit
+KEYS = "Keys: space play/stop · ← → move · N, B warnings · C colour by error · 1 to 8 show/hide parts"
 PARTS = {
-    "arm_uncorrected": "orange ghost: robot today",
-    "arm_corrected": "solid: robot corrected",
+    "arm_uncorrected": "orange ghost: today",
+    "arm_corrected": "solid: corrected",
     "error_vectors": "arrows: errors",
-    "tool_frames": "x red, y green, z blue",
-    "region": "green: the flange was measured here",
+    "tool_frames": "tool x, y, z: red, green, blue",
+    "region": "pale green: measured",
 }
 
 
@@ -44,45 +47,42 @@ def draw_legend(
         visible: the parts of the view, and which of them are shown.
     """
     page = _Rows(figure, LEGEND_PX)
-    page.text(0, 0, shorten(title, 40, placeholder=" …"), bold=True)
-    times = f"errors drawn {magnification:g} times as long as they are" if magnification != 1 else "errors in true size"
+    page.text(0, 0, shorten(title, 44, placeholder=" …"), bold=True)
+    times = f"errors drawn {magnification:.4g} times as long" if magnification != 1 else "errors in true size"
     page.text(0, LEGEND_PX[0] - 2 * LEFT_PX, times, right=True, bold=True)
-    real, corrected = (f"mean {e.mean():.3f}, max {e.max():.3f} mm" for e in (course.real_mm, course.corrected_mm))
-    outside = bool(course.fine.outside.any())
-    columns = (0, 190, 510)
-    for x, text, colour in (
-        (columns[0], "meant by the program", PROGRAMMED),
-        (columns[1], f"real tool today: {real}", UNCORRECTED),
-        (columns[2], f"corrected: {corrected}", CORRECTED),
-    ):
-        page.swatch(1, x, colour if by_error is None or colour == PROGRAMMED else None)
-        page.text(1, x + SWATCH_PX + 6, text)
-    if outside:
-        page.swatch(0, 370, OUTSIDE)
-        page.text(0, 370 + SWATCH_PX + 6, "joints not measured")
-    if by_error is None:
-        page.text(2, 0, "   ".join(text for part, text in PARTS.items() if visible[part]), pale=True)
-    else:
-        page.text(2, 0, "Colour of the lines: how far the tool is from where it is meant to be", pale=True)
-        page.scale(2, 490, 240, by_error)
+    real, corrected = (f"mean {e.mean:.3f}, max {e.max:.3f} mm" for e in course.at_waypoints())
+    page.swatch(1, 0, PROGRAMMED)
+    page.text(1, 32, "programmed")
+    page.swatch(1, 140, CORRECTED)
+    page.text(1, 172, f"corrected: {corrected}")
+    if course.fine.outside.any():
+        page.swatch(1, 480, OUTSIDE)
+        page.text(1, 512, "joints not measured")
+    page.swatch(2, 0, UNCORRECTED if by_error is None else None)
+    page.text(2, 32, f"real tool today: {real}")
+    if by_error is not None:
+        page.scale(2, 492, 140, by_error)
+    page.text(3, 0, "  ·  ".join(text for part, text in PARTS.items() if visible[part]), pale=True)
 
 
-def draw_place(figure: Figure, course: Course, share: float, chosen: int | None) -> None:
+def draw_place(figure: Figure, course: Course, share: float, chosen: int | None, keys: bool | None) -> None:
     """Where the tool is, how far off, and the warning that was stepped to.
 
     Args:
         chosen: which of the remarks; None: none.
+        keys: whether there are controls, with keys of the keyboard; None: there are no controls.
     """
-    page = _Rows(figure, PLACE_PX)
+    page = _Rows(figure, STILL_PX if keys is None else PLACE_PX)
     page.text(0, 0, place_in_words(course, share))
     if chosen is not None:
-        page.text(1, 0, shorten(remark_in_words(course, chosen), 138, placeholder=" …"), colour=WARNING, bold=True)
+        text = shorten(remark_in_words(course, chosen), LONGEST_BOLD, placeholder=" …")
+        page.text(1, 0, text, colour=WARNING, bold=True)
     else:
         count = len(course.remarks)
-        page.text(
-            1, 0, f"{count} warnings: N for the next" if count > 1 else ("1 warning: N" if count else "No warnings")
-        )
-    page.text(2, 0, KEYS, pale=True)
+        said = f"{count} warning{'' if count == 1 else 's'}" if count else "No warnings"
+        page.text(1, 0, f"{said}: N for the next" if count and keys else said)
+    if keys is not None:
+        page.text(2, 0, KEYS if keys else "Open Controls, top right, has sliders and buttons", pale=True)
 
 
 def place_in_words(course: Course, share: float) -> str:
@@ -93,8 +93,10 @@ def place_in_words(course: Course, share: float) -> str:
         where = f"line {shown.line[waypoint]}"
     label = shown.labels[waypoint] if shown.labels else ""
     known = "; joints not measured here" if unknown else ""
-    numbers = f"tool {real:.2f} mm off today, {corrected:.3f} mm corrected{known}"
-    return f"{where}: {numbers}" + (f"   {shorten(label, 60, placeholder=' …')}" if label else "")
+    numbers = f"{real:.2f} mm off today, {corrected:.3f} mm corrected{known}"
+    said = f"{where}: {numbers}"
+    room = LONGEST - len(said) - 3
+    return said + (f"   {shorten(label, room, placeholder=' …')}" if label and room > 10 else "")
 
 
 def remark_in_words(course: Course, chosen: int) -> str:

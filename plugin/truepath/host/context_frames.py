@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from truepath import lie
 from truepath.arm import inboard_joints
 from truepath.errors import InputError
-from truepath.export import arm_frames, move_arm_frames
+from truepath.export import flange_mount, joint_frames, move_arm_frames
 from truepath.lie import Array
 from truepath.motions import BEFORE_THE_FLANGE, Moves
+from truepath.mounts import Mount, mounts_on_the_way, welds_inboard
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
-    from pydrake.multibody.tree import FixedOffsetFrame
+    from pydrake.multibody.tree import Frame
     from pydrake.systems.framework import Context
 
     from truepath.host.arm_in_plant import ArmInPlant
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 NOTHING = 1e-12  # m and entries of a rotation: frames that differ by less are the same
 TRIAL_M = 0.001
+WITH_FLANGE: Literal["with flange"] = "with flange"
+ToolWay = bool | Literal["with flange"]
 
 
 @dataclass(frozen=True)
@@ -37,56 +39,74 @@ class AppliedFrames:
         base: ``as drawn``: no calibration of it, or not wanted; ``frame``: the frame that the base is welded to was
             moved; ``joints``: that frame cannot be moved, so the arm from its first joint on was, and the body of
             the base stays as drawn.
-        tool: ``as drawn`` on the flange, or ``frame``: the frame by which it is mounted was moved.
+        tool: ``as drawn`` on the flange; ``frame``: what holds the tool was moved, and all of the tool with it;
+            ``frame alone``: the tool frame was moved, and the body that it is on, with its shapes, stays as drawn on
+            the flange; ``with flange``: flange and tool were moved as one, so that the tool is right.
         left_out: what the calibration knows and no frame can carry; ``JointCorrection`` and ``CalibratedRobot`` do.
+        flange: ``frame``: it is where the calibration has it; ``with tool``: it was moved as one with the tool;
+            ``as drawn``: on the last link, whose axis is right, because nothing between them can be moved.
     """
 
     frames: tuple[str, ...]
     base: str
     tool: str
     left_out: tuple[str, ...]
+    flange: str = "frame"
 
 
-def apply_frames(robot: PlacedRobot, context: Context, *, base: bool, tool: bool) -> AppliedFrames:
+def apply_frames(robot: PlacedRobot, context: Context, *, base: bool, tool: ToolWay) -> AppliedFrames:
     """Sets the frames of a calibration on the plant's context; see ``CalibrationPlugin.apply``."""
-    place, model = _place(robot), robot.model
+    if tool not in (True, False, WITH_FLANGE):
+        raise InputError("unknown way to set the tool", expected=f"True, False or {WITH_FLANGE!r}", found=repr(tool))
+    place = _place(robot)
     reset_frames(place, context)
     try:
-        moved, base_how, tool_how = _set_frames(robot, place, context, base, tool)
+        return _set_frames(robot, place, context, base, tool)
     except InputError:
         reset_frames(place, context)  # nothing by halves
         raise
-    names = tuple(frame.scoped_name().get_full() for frame in moved)
-    return AppliedFrames(names, base_how, tool_how, left_out(model))
 
 
-def _set_frames(
-    robot: PlacedRobot, place: ArmInPlant, context: Context, base: bool, tool: bool
-) -> tuple[list[FixedOffsetFrame], str, str]:
+def _set_frames(robot: PlacedRobot, place: ArmInPlant, context: Context, base: bool, tool: ToolWay) -> AppliedFrames:
     plant, arm = place.plant, place.arm
-    X_BB, base_how, tool_how = lie.invert(robot.X_WB) @ robot.X_WB_real, "as drawn", "as drawn"
-    moved = list(arm_frames(plant, arm))
+    X_BB, base_how = lie.invert(robot.X_WB) @ robot.X_WB_real, "as drawn"
+    moved = list(joint_frames(arm))
     if base and not _same(X_BB, np.eye(4)):
         mount, base_how = _base_mount(place), "joints"
         if mount is not None:
             base_how = "frame"
-            X_WG = mount.CalcPoseInWorld(context).GetAsMatrix4()
-            _set_in_world(mount, context, robot.X_WB_real @ lie.invert(robot.X_WB) @ X_WG)
-            moved.append(mount)
+            mount.move(context, robot.X_WB_real @ lie.invert(robot.X_WB))
+            moved.append(mount.frame)
     move_arm_frames(robot.model, plant, arm, context, X_BB=X_BB if base_how == "joints" else None)
-    if tool and place.tool is not None:
-        X_FT = place.tool.CalcPose(context, arm.flange).GetAsMatrix4()
-        if not _same(X_FT, robot.X_FT_real):
-            moved.append(_move_tool(robot, place, context))
-            tool_how = "frame"
-    return moved, base_how, tool_how
+    by_which = flange_mount(plant, arm)
+    flange_how = "as drawn" if by_which is None else "frame"
+    if by_which is not None:
+        moved.append(by_which.frame)
+    tool_how = "as drawn"
+    if tool is not False and place.tool is not None:
+        X_WT = _real_flange(robot, place, context, base) @ robot.X_FT_real
+        off = X_WT @ lie.invert(place.tool.CalcPoseInWorld(context).GetAsMatrix4())
+        if not _same(off, np.eye(4)):
+            mount, tool_how = _tool_mount(place, tool, X_WT[:3, 3] - place.tool.CalcPoseInWorld(context).translation())
+            mount.move(context, off)
+            if tool_how == WITH_FLANGE:
+                flange_how = "with tool"
+            else:
+                moved.append(mount.frame)
+    names = tuple(frame.scoped_name().get_full() for frame in moved)
+    return AppliedFrames(names, base_how, tool_how, left_out(robot.model), flange_how)
 
 
 def reset_frames(place: ArmInPlant, context: Context) -> None:
     """Sets all frames that a calibration may have moved back to the plant's defaults."""
-    mount = _base_mount(place)
-    for frame in [*arm_frames(place.plant, place.arm), *_tool_mounts(place), *([] if mount is None else [mount])]:
-        _set_default(place.plant, frame, context)
+    from pydrake.multibody.tree import FixedOffsetFrame
+
+    mounts = [*_tool_mounts(place), flange_mount(place.plant, place.arm), _base_mount(place)]
+    frames = [joint.frame_on_parent() for joint in place.arm.joints]
+    default = place.plant.CreateDefaultContext()
+    for frame in [*frames, *(mount.frame for mount in mounts if mount is not None)]:
+        if isinstance(frame, FixedOffsetFrame):
+            frame.SetPoseInParentFrame(context, frame.GetPoseInParentFrame(default))
 
 
 def left_out(model: CalibratedModel) -> tuple[str, ...]:
@@ -106,48 +126,44 @@ def _same(X: Array, Y: Array) -> bool:
     return bool(np.abs(X - Y).max() < NOTHING)
 
 
-def _set_default(plant: MultibodyPlant, frame: FixedOffsetFrame, context: Context) -> None:
-    frame.SetPoseInParentFrame(context, frame.GetPoseInParentFrame(plant.CreateDefaultContext()))
-
-
-def _set_in_world(frame: FixedOffsetFrame, context: Context, X_WG: Array) -> None:
-    """Moves a frame to a pose ``(4, 4)``, whatever frame it is counted from."""
-    from pydrake.math import RigidTransform, RotationMatrix
-
-    X_PG = frame.GetPoseInParentFrame(context).GetAsMatrix4()
-    X_WP = frame.CalcPoseInWorld(context).GetAsMatrix4() @ lie.invert(X_PG)
-    X = lie.invert(X_WP) @ X_WG
-    R = RotationMatrix.ProjectToRotationMatrix(X[:3, :3])  # without the last rounding
-    frame.SetPoseInParentFrame(context, RigidTransform(R, X[:3, 3]))
+def _real_flange(robot: PlacedRobot, place: ArmInPlant, context: Context, base: bool) -> Array:
+    """``(4, 4)`` X_WF of the rigid part of the calibration, fixed to the last link, at the context's joints."""
+    zero = place.plant.CreateDefaultContext()
+    zero.SetTimeStateAndParametersFrom(context)
+    for joint in place.arm.joints:
+        joint.set_angle(zero, 0.0)
+    link = place.arm.joints[-1].child_body().body_frame()
+    X_WF_zero = (robot.X_WB_real if base else robot.X_WB) @ robot.model.robot.X_BF
+    X_LF = lie.invert(link.CalcPoseInWorld(zero).GetAsMatrix4()) @ X_WF_zero
+    return link.CalcPoseInWorld(context).GetAsMatrix4() @ X_LF
 
 
 # --- the base -------------------------------------------------------------------------------------------
 
 
-def _base_mount(place: ArmInPlant) -> FixedOffsetFrame | None:
+def _base_mount(place: ArmInPlant) -> Mount | None:
     """The frame by which the base is welded to what it stands on, if it can be moved and nothing else hangs on it."""
     from pydrake.multibody.tree import FixedOffsetFrame
 
-    plant, arm = place.plant, place.arm
-    for joint in _welds_inboard(plant, arm.base.body()):
+    for joint in welds_inboard(place.plant, place.arm.base.body()):
         frame = joint.frame_on_parent()
-        if isinstance(frame, FixedOffsetFrame) and _carries_only(place, frame):
-            return frame
+        if isinstance(frame, FixedOffsetFrame):
+            mount = Mount(frame, joint.child_body())
+            if _carries_only(place, mount):
+                return mount
     return None
 
 
-def _carries_only(place: ArmInPlant, mount: FixedOffsetFrame) -> bool:
+def _carries_only(place: ArmInPlant, mount: Mount) -> bool:
     """Whether nothing moves with a frame but the arm, and what the arm carries: it is tried."""
     from pydrake.multibody.tree import FrameIndex
 
     plant = place.plant
     context = plant.CreateDefaultContext()
     frames = [plant.get_frame(FrameIndex(index)) for index in range(plant.num_frames())]
-    others = [frame for frame in frames if frame.index() != mount.index() and not _belongs(place, frame.body())]
+    others = [frame for frame in frames if frame.index() != mount.frame.index() and not _belongs(place, frame.body())]
     before = [frame.CalcPoseInWorld(context).GetAsMatrix4() for frame in others]
-    X_WG = mount.CalcPoseInWorld(context).GetAsMatrix4()
-    X_WG[:3, 3] += TRIAL_M
-    _set_in_world(mount, context, X_WG)
+    mount.move(context, lie.make_pose(translation=np.full(3, TRIAL_M)))
     return all(_same(frame.CalcPoseInWorld(context).GetAsMatrix4(), X) for frame, X in zip(others, before, strict=True))
 
 
@@ -170,50 +186,42 @@ def _belongs(place: ArmInPlant, body: Any) -> bool:
 # --- the tool -------------------------------------------------------------------------------------------
 
 
-def _move_tool(robot: PlacedRobot, place: ArmInPlant, context: Context) -> FixedOffsetFrame:
+def _tool_mount(place: ArmInPlant, how: ToolWay, off_m: Array) -> tuple[Mount, str]:
+    """By what the tool is moved, and how that is told."""
     assert place.tool is not None
-    mounts = _tool_mounts(place)
-    if not mounts:
-        raise InputError(
-            f"the tool frame {place.tool.name()!r} cannot be set to where it is on the real flange",
-            expected="a tool that hangs on the flange by a FixedOffsetFrame, as plant.AddFrame(FixedOffsetFrame(name, "
-            "flange, X_FG)) and plant.WeldFrames(that frame, tool) make one; or tool=False to leave it as drawn",
-            found="a weld without a frame of its own, whose pose is no parameter of a context",
-        )
-    mount, arm = mounts[0], place.arm
-    X_GT = place.tool.CalcPose(context, mount).GetAsMatrix4()
-    X_WF = arm.flange.CalcPoseInWorld(context).GetAsMatrix4()
-    _set_in_world(mount, context, X_WF @ robot.X_FT_real @ lie.invert(X_GT))
-    return mount
+    if how == WITH_FLANGE:
+        mount = flange_mount(place.plant, place.arm)
+        if mount is not None and _holds(place.plant, mount, place.tool):
+            return mount, WITH_FLANGE
+    elif mounts := _tool_mounts(place):
+        on_the_flange = place.tool.body().index() == place.arm.flange.body().index()
+        return mounts[0], "frame" if mounts[0].held is not None or on_the_flange else "frame alone"
+    raise InputError(
+        f"the tool frame {place.tool.name()!r} cannot be set to where it is on the real flange, "
+        f"{1e3 * np.linalg.norm(off_m):.3f} mm away",
+        expected="a tool that hangs on the flange by a FixedOffsetFrame, as plant.AddFrame(FixedOffsetFrame(name, "
+        "flange, X_FG)) and plant.WeldFrames(that frame, tool) make one; or tool=False, which sets all the rest and "
+        f"leaves the tool as drawn; or tool={WITH_FLANGE!r}, which moves flange and tool as one where the flange hangs "
+        "on the last link by such a frame",
+        found="a weld without a frame of its own, whose pose is no parameter of a context",
+    )
 
 
-def _tool_mounts(place: ArmInPlant) -> list[FixedOffsetFrame]:
-    """Frames between flange and tool frame that can be moved, from the flange outwards."""
-    from pydrake.multibody.tree import FixedOffsetFrame
-
+def _tool_mounts(place: ArmInPlant) -> list[Mount]:
+    """What can be moved between flange and tool frame, from the flange outwards."""
     if place.tool is None:
         return []
     plant, arm = place.plant, place.arm
-    last_link = arm.joints[-1].child_body()
-    to_the_flange = {int(joint.index()) for joint in _welds_inboard(plant, arm.flange.body(), last_link)}
-    welds = [
-        joint
-        for joint in _welds_inboard(plant, place.tool.body(), last_link)
-        if int(joint.index()) not in to_the_flange
-    ]
-    taken = {int(frame.index()) for frame in (*arm_frames(plant, arm), arm.flange)}
-    frames = [*(joint.frame_on_parent() for joint in reversed(welds)), place.tool]
-    return [frame for frame in frames if isinstance(frame, FixedOffsetFrame) and int(frame.index()) not in taken]
+    last_link, own = arm.joints[-1].child_body(), flange_mount(plant, arm)
+    to_the_flange = {int(mount.frame.index()) for mount in mounts_on_the_way(plant, arm.flange, last_link)}
+    taken = {*to_the_flange, int(arm.flange.index()), *([] if own is None else [int(own.frame.index())])}
+    mounts = mounts_on_the_way(plant, place.tool, last_link)
+    return [mount for mount in mounts if int(mount.frame.index()) not in taken]
 
 
-def _welds_inboard(plant: MultibodyPlant, body: Any, until: Any = None) -> Iterator[Any]:
-    """Welds from a body towards the world, up to another body."""
-    from pydrake.multibody.tree import JointIndex
-
-    inboard = inboard_joints(plant)
-    while (until is None or body.index() != until.index()) and (j := inboard.get(int(body.index()))) is not None:
-        joint = plant.get_joint(JointIndex(j))
-        if joint.type_name() != "weld":
-            return
-        yield joint
-        body = joint.parent_body()
+def _holds(plant: MultibodyPlant, mount: Mount, frame: Frame) -> bool:
+    """Whether a frame moves with a mount: it is tried."""
+    context = plant.CreateDefaultContext()
+    before = frame.CalcPoseInWorld(context).GetAsMatrix4()
+    mount.move(context, lie.make_pose(translation=np.full(3, TRIAL_M)))
+    return not _same(frame.CalcPoseInWorld(context).GetAsMatrix4(), before)

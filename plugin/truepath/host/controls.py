@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from truepath.host.live_view import LiveView
 
 PATH, MAGNIFY = "Path, %", "Error, times"
@@ -40,28 +42,39 @@ class Controls:
     ) -> None:
         self.view, self.playing = view, False
         self._say, self._clock = say, clock
-        meshcat = self._meshcat = view.meshcat
-        self.remove()  # those of an earlier view
-        self._percent = meshcat.AddSlider(PATH, 0.0, 100.0, STEP_PERCENT, 0.0, "ArrowLeft", "ArrowRight")
-        largest = max(LARGEST, view.magnification)
-        meshcat.AddSlider(MAGNIFY, 1.0, largest, 1.0, view.magnification)
-        self._actions: dict[str, Callable[[], None]] = {
+        meshcat, spot = view.meshcat, view.spot
+        self._meshcat = meshcat
+        spot.remove_controls(meshcat)  # those of earlier ones of this view
+        self._path, self._magnify = spot.label(PATH), spot.label(MAGNIFY)
+        actions: dict[str, Callable[[], None]] = {
             PLAY: self._play_or_stop,
             NEXT: lambda: self._step(1),
             PREVIOUS: lambda: self._step(-1),
             COLOUR: lambda: view.colour_by_error(not view.by_error),
         }
         for label, part in SHOW.items():
-            self._actions[label] = lambda part=part: view.show(part, not view.visible[part])  # type: ignore[misc]
+            actions[label] = lambda part=part: view.show(part, not view.visible[part])  # type: ignore[misc]
+        self._actions = {spot.label(label): act for label, act in actions.items()}
+        spot.sliders += [self._path, self._magnify]
+        spot.buttons += self._actions
+        arrows = ("ArrowLeft", "ArrowRight") if spot.has_keys else ("", "")
+        for name in spot.sliders:  # should the host have such
+            meshcat.DeleteSlider(name, strict=False)
+        for name in spot.buttons:
+            meshcat.DeleteButton(name, strict=False)
+        self._percent = meshcat.AddSlider(self._path, 0.0, 100.0, STEP_PERCENT, 100.0 * view.place, *arrows)
+        self._factor = self._add_magnifier()
         keys = ("Space", "KeyN", "KeyB", "KeyC", *(f"Digit{k + 1}" for k in range(len(SHOW))))
         for label, key in zip(self._actions, keys, strict=True):
-            meshcat.AddButton(label, key)
+            meshcat.AddButton(label, key if spot.has_keys else "")
         self._clicks = dict.fromkeys(self._actions, 0)
         self._now = self._written = self._moved = clock()
         self._to_write = False
 
     def poll(self) -> None:
-        """Does what was asked for since the last time, and moves on if it plays."""
+        """Does what was asked for since the last time, and moves on if it plays; nothing once they are removed."""
+        if self.is_removed:
+            return
         now, before = self._clock(), self._now
         self._now = now
         for label, act in self._actions.items():
@@ -69,34 +82,46 @@ class Controls:
             for _ in range(clicks - self._clicks[label]):
                 act()
             self._clicks[label] = clicks
-        self.view.magnify(self._meshcat.GetSliderValue(MAGNIFY))
-        asked = self._meshcat.GetSliderValue(PATH)
+        factor = self._meshcat.GetSliderValue(self._magnify)
+        if factor != self._factor:
+            self._factor = factor
+            self.view.magnify(factor)
+        asked = self._meshcat.GetSliderValue(self._path)
         if asked != self._percent:  # the operator's hand goes before what is played
             self._percent = asked
             self._go_to(asked / 100.0)
         elif self.playing and self.view.course.duration_s:
             share = self.view.place + (now - before) / self.view.course.duration_s
             self._go_to(share if share <= 1.0 else 0.0)
-            self._percent = self._meshcat.SetSliderValue(PATH, 100.0 * self.view.place)
+            self._percent = self._meshcat.SetSliderValue(self._path, 100.0 * self.view.place)
         rests = now - self._moved >= TEXT_AFTER_S
         if self._to_write and (rests or now - self._written >= TEXT_EVERY_S):
             self.view.write_place()
             self._written, self._to_write = now, False
 
     def run(self, seconds: float | None = None) -> None:
-        """Polls until the time is over; None: until somebody interrupts."""
+        """Polls until the time is over, or until they are removed; None: until somebody interrupts."""
         end = None if seconds is None else time.monotonic() + seconds
-        while end is None or time.monotonic() < end:
+        while not self.is_removed and (end is None or time.monotonic() < end):
             begun = time.monotonic()
             self.poll()
             time.sleep(max(1.0 / FRAMES_PER_SECOND - (time.monotonic() - begun), 0.001))
 
+    @property
+    def is_removed(self) -> bool:
+        """Whether the view was taken away, by ``remove`` or by another view in its place."""
+        return self.view.is_removed
+
     def remove(self) -> None:
-        """Takes the controls away, those of the host stay."""
-        for name in (PATH, MAGNIFY):
-            self._meshcat.DeleteSlider(name, strict=False)
-        for name in (PLAY, NEXT, PREVIOUS, COLOUR, *SHOW):
-            self._meshcat.DeleteButton(name, strict=False)
+        """Takes the controls and the view away; those of the host and of other views stay."""
+        self.view.remove()
+
+    def _add_magnifier(self) -> float:
+        """The slider, between bounds that hold the factor of the view; what it stands at."""
+        factor = self.view.magnification
+        step = 1.0 if factor >= 1.0 else factor
+        largest = max(LARGEST, np.ceil(factor / step) * step)
+        return self._meshcat.AddSlider(self._magnify, step, float(largest), step, factor)
 
     def _go_to(self, share: float) -> None:
         self.view.go_to(share)
@@ -109,4 +134,4 @@ class Controls:
         self.playing = False
         text = self.view.step(by)
         self._say("no warnings" if text is None else text)
-        self._percent = self._meshcat.SetSliderValue(PATH, 100.0 * self.view.place)
+        self._percent = self._meshcat.SetSliderValue(self._path, 100.0 * self.view.place)

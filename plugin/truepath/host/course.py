@@ -11,12 +11,14 @@ import numpy as np
 from truepath import lie
 from truepath.errors import InputError
 from truepath.host.placed_robot import PlacedRobot
+from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
-from truepath.preview.shown import Remark, ShownPath
+from truepath.preview.shown import Remark, ShownPath, require_joints
 from truepath.preview.thinning import LINE_LIMIT, thin_out
 from truepath.preview.toolpaths import FinePaths, Toolpaths
 
 if TYPE_CHECKING:
+    from truepath.controller import Controller
     from truepath.host.plugin import CalibrationPlugin
     from truepath.rewriting.options import RewriteOptions
     from truepath.rewriting.rewrite import RewrittenProgram
@@ -24,6 +26,27 @@ if TYPE_CHECKING:
 JOINT_SPEED_RAD_S, TOOL_SPEED_M_S = 0.6, 0.1
 SHORTEST_S, LONGEST_S = 6.0, 60.0
 METRES_PER_RAD, ERROR_WEIGHT = 0.3, 50.0  # what joints and errors count when points are chosen
+
+
+def opened_program(
+    plugin: CalibrationPlugin, file: str | Path, options: RewriteOptions | None
+) -> tuple[RewrittenProgram, Controller, str | None]:
+    """A program corrected, the controller that it was corrected for, and its text if it has statements to show.
+
+    Raises:
+        InputError, CorrectionError: as ``correct``; a program without a target.
+    """
+    from truepath.controller import controller_of
+    from truepath.rewriting.open import SCRIPTS
+    from truepath.rewriting.options import RewriteOptions
+
+    options = options or RewriteOptions()
+    done = plugin.correct(file, options=options)
+    if not len(done.plan):
+        raise InputError("there is nothing to show", file=file, expected="targets that can be resolved")
+    is_script = Path(file).suffix.lower() in SCRIPTS
+    text = Path(file).read_bytes().decode("utf-8", "replace") if is_script else None
+    return done, controller_of(plugin.robot, options.controller_kinematics), text
 
 
 def shown_path(
@@ -36,30 +59,25 @@ def shown_path(
         options: if the program is a file.
 
     Raises:
-        InputError, CorrectionError: as ``correct``; a program without a target, paths that differ.
+        InputError, CorrectionError: as ``correct``; a program without a target, paths that differ, joints that are
+            no numbers, corrected joints or options for another kind of program.
     """
-    if isinstance(program, (str, Path)):
-        from truepath.controller import controller_of
-        from truepath.rewriting.options import RewriteOptions
-
-        options = options or RewriteOptions()
-        done = plugin.correct(program, options=options)
-        if not len(done.plan):
-            raise InputError("there is nothing to show", file=program, expected="targets that can be resolved")
-        text = Path(program).read_bytes().decode("utf-8", "replace")
-        shown = ShownPath.of_program(done, controller_of(plugin.robot, options.controller_kinematics), text)
-        return replace(shown, remarks=(*shown.remarks, *_left_as_they_are(done, shown)))
-    if hasattr(program, "start_time"):
+    is_file = isinstance(program, (str, Path))
+    is_trajectory = not is_file and hasattr(program, "start_time")
+    if corrected is not None and (is_file or is_trajectory):
+        raise InputError("only joints come with joints that correct them", expected="corrected=None")
+    if options is not None and not is_file:
+        raise InputError("these options are for the file of a program", expected="options=None")
+    if is_file:
+        return ShownPath.of_program(*opened_program(plugin, program, options))
+    if is_trajectory:
         moved = plugin.correct(program)
         at = (program.vector_values(moved.time_s).T, moved.trajectory.vector_values(moved.time_s).T)
         return ShownPath.of_joints(*at, [f"{time:.2f} s" for time in moved.time_s])
     q = np.atleast_2d(np.asarray(program, float))
-    if corrected is None:
-        return ShownPath.of_joints(q, plugin.correct(q).q_rad)
-    corrected = np.atleast_2d(np.asarray(corrected, float))
-    if corrected.shape != q.shape:
-        raise InputError("programmed and corrected path differ", expected=str(q.shape), found=str(corrected.shape))
-    return ShownPath.of_joints(q, corrected)
+    q_corrected = plugin.correct(q).q_rad if corrected is None else np.atleast_2d(np.asarray(corrected, float))
+    require_joints(q, q_corrected, plugin.robot.num_joints)
+    return ShownPath.of_joints(q, q_corrected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,20 +111,25 @@ class Course:
 
     @classmethod
     def of(cls, robot: PlacedRobot, shown: ShownPath) -> Course:
-        """With the program's own tool if it has one, else the host's."""
-        X_FT, X_FT_real = robot.X_FT, robot.X_FT_real
+        """With the program's own tool if it has one, else the host's.
+
+        Errors at a program's tool are those that ``correct`` and the page tell, to the last digit: with the tool on
+        the flange as the program states it, also where the calibration knows the flange to be a little off.
+        """
+        X_FT, X_FT_used = robot.X_FT, robot.X_FT_real
         if shown.X_FT is not None:
-            X_FT, X_FT_real = shown.X_FT, X_FT_real @ lie.invert(X_FT) @ shown.X_FT
-        fine = FinePaths.of(robot.model, replace(shown, X_FT=X_FT_real), shown.outside(robot.region))
+            X_FT = X_FT_used = shown.X_FT
+        fine = FinePaths.of(robot.model, replace(shown, X_FT=X_FT_used), shown.outside(robot.region))
         paths: Toolpaths = fine.paths
-        meant, real, corrected = (
-            moved_points(robot.X_WB_real, points) for points in (paths.goal, paths.uncorrected, paths.corrected)
-        )
+        X_FF_real = robot.X_FT_real @ lie.invert(robot.X_FT)
+        X_WT = robot.X_WB_real @ paths.X_BT_goal @ (lie.invert(X_FT_used) @ X_FF_real @ X_FT)
+        meant, R_WB = X_WT[:, :3, 3], robot.X_WB_real[:3, :3]
+        real, corrected = (meant + (points - paths.goal) @ R_WB.T for points in (paths.uncorrected, paths.corrected))
         remarks = sorted((*shown.remarks, *shown.stretches_outside(robot.region)), key=lambda each: each.waypoint or 0)
         return cls(
             shown,
             fine,
-            robot.X_WB_real @ paths.X_BT_goal,
+            X_WT,
             X_FT[:3, 3],
             meant,
             real,
@@ -121,6 +144,16 @@ class Course:
     def duration_s(self) -> float:
         """Of a run through all of it; 0 where nothing moves."""
         return float(self.time_s[-1])
+
+    @property
+    def worst(self) -> int:
+        """The waypoint at which the tool is off most today, counted from 0."""
+        return int(np.argmax(self.real_mm[self.fine.waypoint]))
+
+    def at_waypoints(self) -> tuple[ErrorStatistics, ErrorStatistics]:
+        """Errors at the waypoints: today, corrected; in true size."""
+        real, corrected = (errors[self.fine.waypoint] for errors in (self.real_mm, self.corrected_mm))
+        return ErrorStatistics.of(real), ErrorStatistics.of(corrected)
 
     def drawn(self, points: Array, magnification: float) -> Array:
         """``(K, 3)`` points of the real tool with their distance from those meant magnified."""
@@ -146,14 +179,6 @@ class Course:
         point = after if within > 0 else before
         waypoint = int(np.searchsorted(self.fine.waypoint, point))
         return min(waypoint, len(self.fine.waypoint) - 1), bool(self.fine.outside[point])
-
-
-def _left_as_they_are(done: RewrittenProgram, shown: ShownPath) -> list[Remark]:
-    assert shown.line is not None
-    return [
-        Remark(f"line {each.line} stays as it is: {each.why}", int(np.argmin(np.abs(shown.line - each.line))))
-        for each in done.unresolved
-    ]
 
 
 def moved_points(X_AB: Array, p_B: Array) -> Array:

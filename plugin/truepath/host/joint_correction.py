@@ -29,9 +29,9 @@ def JointCorrection_(T: type) -> type:
         ``inside`` (1 where the calibration's data reached). Direct feedthrough, no state: the same input gives the same
         output, whatever came before. Solved once for each input and kept in a cache entry.
 
-        Scalars: ``float`` and ``AutoDiffXd`` (derivatives by central differences, to about 1e-5; of joints only, not of
-        velocities), so that a diagram with it can be cloned and linearised. ``Expression`` is not possible, for the
-        solver is no expression: Drake says so where a conversion is asked for.
+        Scalars: ``float`` and ``AutoDiffXd`` (derivatives by central differences: of joints to about 1e-5, of
+        velocities to about 1e-4 of the velocity), so that a diagram with it can be cloned and linearised.
+        ``Expression`` is not possible, for the solver is no expression: Drake says so where a conversion is asked for.
 
         Args:
             source: a plugin, or a calibration alone (then for the arm's joints only). The calibration that it has now:
@@ -60,8 +60,6 @@ def JointCorrection_(T: type) -> type:
             self.settings = {"takes": takes, "of": of, "max_correction_mm": max_correction_mm}
             if takes not in ("joints", "state") or of not in ("arm", "plant"):
                 raise InputError("unknown kind of input", expected="joints or state, of arm or plant")
-            if takes == "state" and T is not float:
-                raise InputError("corrected velocities have no derivatives", expected="takes='joints'")
             self._correct = SteadyCorrection(self.robot.model, max_correction_mm)
             n, place = self.robot.model.robot.num_joints, self.robot.place
             if of == "arm":
@@ -98,7 +96,13 @@ def JointCorrection_(T: type) -> type:
             else:
                 q = ExtractValue(desired[self._q]).ravel()
                 found = self._correct(q)
-                out[self._q] = _with_derivatives(found.q_rad, self._correct, q, desired[self._q])
+                J, q_ad = self._correct.jacobian(q), desired[self._q]
+                out[self._q] = _with_derivatives(found.q_rad, (J, q_ad))
+                if self.settings["takes"] == "state":
+                    v_ad = desired[self._v]
+                    v = ExtractValue(v_ad).ravel()
+                    H = self._correct.along_and_around(q, v)
+                    out[self._v] = _with_derivatives(self._correct.along(q, v), (H, q_ad), (J, v_ad))
             value.set_value([out, found.valid])
 
         def _corrected(self, context: Any, output: Any) -> None:
@@ -118,9 +122,10 @@ def JointCorrection_(T: type) -> type:
 JointCorrection = JointCorrection_[float]
 
 
-def _with_derivatives(value: Array, correct: SteadyCorrection, q: Array, q_ad: Array) -> Array:
-    """``(n,)`` with the derivatives that ``q_ad`` has, by the chain rule."""
-    gradient = ExtractGradient(q_ad)
-    if gradient.shape[1] == 0:
+def _with_derivatives(value: Array, *slopes_and_inputs: tuple[Array, Array]) -> Array:
+    """``(n,)`` with the derivatives of the inputs ``(n,)`` that it depends on by slopes ``(n, n)``: the chain rule."""
+    gradients = [(slope, ExtractGradient(given)) for slope, given in slopes_and_inputs]
+    known = [slope @ gradient for slope, gradient in gradients if gradient.shape[1]]
+    if not known:
         return InitializeAutoDiff(value).ravel()
-    return InitializeAutoDiff(value, correct.jacobian(q) @ gradient).ravel()
+    return InitializeAutoDiff(value, sum(known)).ravel()

@@ -1,23 +1,12 @@
-"""Paths in a host's own Meshcat, in its world."""
+"""What ``CalibrationPlugin.preview`` gives back of a picture in a host's own Meshcat."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from truepath.host.course import Course
-from truepath.host.lines_drawn import draw_line
-from truepath.host.placed_robot import PlacedRobot
+from truepath.host.live_view import LiveView
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
-from truepath.preview.colours import CORRECTED, PROGRAMMED, UNCORRECTED, unit_rgb
-from truepath.preview.shown import ShownPath
-
-if TYPE_CHECKING:
-    from pydrake.geometry import Meshcat
-
-PREFIX = "/truepath"
-LINE_RADIUS_M, POINT_RADIUS_M = 0.002, 0.006
 
 
 @dataclass(frozen=True)
@@ -29,6 +18,8 @@ class PathsShown:
             drawn: the distances of the latter two from the first are ``magnification`` times as long as they are.
         magnification: factor by which errors are drawn.
         real_mm, corrected_mm: the distances as they are, at the waypoints.
+        waypoint: at which the arms are, counted from 1.
+        view: to move the arms, to show and hide parts, to take it all away.
     """
 
     programmed: Array
@@ -37,30 +28,12 @@ class PathsShown:
     magnification: float
     real_mm: ErrorStatistics
     corrected_mm: ErrorStatistics
+    waypoint: int
+    view: LiveView
 
-
-def show_paths(meshcat: Meshcat, robot: PlacedRobot, shown: ShownPath, magnification: float) -> PathsShown:
-    """Draws three lines below ``/truepath``: ``programmed``, ``real``, ``corrected``; earlier ones go."""
-    course = Course.of(robot, shown)
-    at = course.fine.waypoint
-    real, corrected = (course.drawn(points, magnification) for points in (course.real, course.corrected))
-    for name, points, colour in (
-        ("programmed", course.meant, PROGRAMMED),
-        ("real", real, UNCORRECTED),
-        ("corrected", corrected, CORRECTED),
-    ):
-        _draw(meshcat, f"{PREFIX}/{name}", points, colour, course.fine.piece)
-    errors = (ErrorStatistics.of(errors[at]) for errors in (course.real_mm, course.corrected_mm))
-    return PathsShown(course.meant, real, corrected, magnification, *errors)
-
-
-def _draw(meshcat: Meshcat, path: str, points: Array, colour: str, piece: Array) -> None:
-    meshcat.Delete(path)
-    if draw_line(meshcat, path, points, LINE_RADIUS_M, unit_rgb(colour), piece):
-        return
-    from pydrake.geometry import Rgba, Sphere
-    from pydrake.math import RigidTransform
-
-    centre = f"{path}/point"
-    meshcat.SetObject(centre, Sphere(POINT_RADIUS_M), Rgba(*unit_rgb(colour), 1.0))
-    meshcat.SetTransform(centre, RigidTransform(points[0]))
+    @classmethod
+    def of(cls, view: LiveView, waypoint: int) -> PathsShown:
+        """Of a view as it is."""
+        course, factor = view.course, view.magnification
+        real, corrected = (course.drawn(points, factor) for points in (course.real, course.corrected))
+        return cls(course.meant, real, corrected, factor, *course.at_waypoints(), waypoint, view)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from truepath import lie
-from truepath.host.captions import LEGEND_PX, PLACE_PX, draw_legend, draw_place
+from truepath.host.captions import LEGEND_PX, PLACE_PX, STILL_PX, draw_legend, draw_place
 from truepath.host.course import Course, moved_points
 from truepath.host.drawn_arm import DrawnArm, body_path, moved_bodies
 from truepath.host.lines_drawn import draw_arrows, draw_frames, draw_line, show_through
+from truepath.host.live_camera import beginning
+from truepath.host.live_spot import free_spot, holds_spot, take_spot
 from truepath.host.on_screen import Pane
 from truepath.host.placed_robot import PlacedRobot
 from truepath.lie import Array
@@ -26,31 +28,30 @@ from truepath.preview.colours import (
 )
 from truepath.preview.covered import covered_surface
 from truepath.preview.keyframes import joints_reaching
+from truepath.preview.toolpaths import Magnification, magnification_of
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, Rgba, SceneGraph
 
-PREFIX = "/truepath"
-PARTS = {  # name, and whether it is shown at the start
-    "programmed": True,
-    "real": True,
-    "corrected": True,
-    "arm_uncorrected": True,
-    "arm_corrected": True,
-    "error_vectors": True,
-    "tool_frames": False,
-    "region": False,
-}
-GHOST_OPACITY, BAND_OPACITY, REGION_OPACITY, HIDDEN_OPACITY = 0.3, 0.45, 0.15, 0.3
+PARTS = (
+    "programmed",
+    "real",
+    "corrected",
+    "arm_uncorrected",
+    "arm_corrected",
+    "error_vectors",
+    "tool_frames",
+    "region",
+)
+PREFIXES_OF_DRAKE = ("visualizer", "illustration")  # of MeshcatVisualizer; of AddDefaultVisualization
+GHOST_OPACITY, BAND_OPACITY, REGION_OPACITY, HIDDEN_OPACITY = 0.3, 0.45, 0.08, 0.3
 MOST_VECTORS, MOST_FRAMES = 66, 12
-LINE_SHARE, BAND, POINT_SHARE, FRAME_SHARE, MARKER_SHARE = 0.0022, 2.6, 0.010, 0.07, 0.028  # of the size of the robot
-VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD = np.radians(-55.0), np.radians(24.0)  # azimuth from where the path lies
-VIEW_DISTANCE = 1.22  # in the size of the robot
-SKY, HORIZON = [1.0, 1.0, 1.0], [0.86, 0.89, 0.92]
+LINE_SHARE, BAND, POINT_SHARE, FRAME_SHARE, MARKER_SHARE = 0.0022, 2.6, 0.010, 0.05, 0.028  # of the size of the robot
+GAP_PX = 2  # between panes
 
 
 class LiveView:
-    """Everything below ``/truepath`` of a Meshcat, and two panes of text that the camera carries.
+    """Everything below the prefix of its spot in a Meshcat, and two panes of text that the camera carries.
 
     Parts, which can be shown and hidden: the lines of the tool ``programmed``, ``real`` (today) and ``corrected``; the
     arms ``arm_uncorrected`` (a ghost) and ``arm_corrected``; ``error_vectors``, from where the tool is meant to be to
@@ -58,15 +59,21 @@ class LiveView:
     places where the calibration knows the flange in some posture.
     Errors are drawn larger than they are, and the arms with their tools on the lines as drawn.
 
-    Draws with contexts of its own: nothing of the host is changed, and whatever it draws itself stays.
+    Draws with contexts of its own: nothing of the host's plant is changed. Of the host's scene it hides the arm, where
+    the host draws that itself, and turns the camera if told so (``look``).
 
     Args:
         meshcat: the host's.
         robot: the calibrated robot in the host's world.
         course: what is shown.
-        scene_graph: with which the host's plant is registered: where the shapes of the arms come from. None: no arms.
-        magnification: factor by which errors are drawn.
+        scene_graph: with which the host's plant is registered: where the shapes of the arms come from. None: rods.
+        drawn_below: prefix of the host's ``MeshcatVisualizer``; None: those that Drake has by itself.
+        magnification: factor by which errors are drawn, or "auto".
         title: of the legend.
+        controls: whether there will be some, as the text says.
+
+    Raises:
+        InputError: a magnification that makes no sense. Nothing is drawn then.
     """
 
     def __init__(
@@ -76,20 +83,28 @@ class LiveView:
         course: Course,
         *,
         scene_graph: SceneGraph | None = None,
-        magnification: float = 50.0,
+        drawn_below: str | None = None,
+        magnification: Magnification = 50.0,
         title: str = "",
+        controls: bool = True,
     ) -> None:
+        assert robot.place is not None, "a robot in a host's plant"
         self.meshcat, self.robot, self.course, self.title = meshcat, robot, course, title
-        self.magnification, self.place, self.by_error = float(magnification), 0.0, False
+        self.place, self.by_error = 0.0, True
+        self.magnification = magnification_of(course.fine.paths.at(course.fine.waypoint), magnification)
         self.chosen: int | None = None
-        self.visible = dict(PARTS)
-        self._legend = Pane(meshcat, "truepath_legend", *LEGEND_PX, "top")
-        self._place = Pane(meshcat, "truepath_place", *PLACE_PX, "bottom")
+        self.visible = dict.fromkeys(PARTS, True)
+        plant = robot.place.plant
+        self.spot = take_spot(meshcat, plant.GetModelInstanceName(robot.place.arm.instance), self)
+        self._prefix, self._keys = self.spot.prefix, self.spot.has_keys if controls else None
+        self._legend, self._place = self._make_panes()
         p_B = (course.meant - robot.X_WB[:3, 3]) @ robot.X_WB[:3, :3]
         self._size = max(float(np.linalg.norm(p_B, axis=1).max()), 0.1)
-        self._scale_mm = scale_end_mm(np.concatenate([course.real_mm, course.corrected_mm]))
-        self.remove()  # what an earlier view left
+        self._scale_mm = scale_end_mm(course.real_mm)
         self._arms = self._make_arms(scene_graph)
+        prefixes = PREFIXES_OF_DRAKE if drawn_below is None else (drawn_below,)
+        own = [body_path(body) for body in moved_bodies(robot.place)]
+        self.spot.hide(meshcat, [f"{prefix.rstrip('/')}/{path}" for prefix in prefixes for path in own])
         self._draw_what_stays()
         self._draw_lines()
         for part, visible in self.visible.items():
@@ -105,12 +120,12 @@ class LiveView:
         before, after, within = self.course.at(self.place)
         for name, arm, q, points in self._arms:
             arm.put((1 - within) * q[before] + within * q[after])
-            self._move(f"{PREFIX}/{name}/tool_point", (1 - within) * points[before] + within * points[after])
+            self._move(f"{self._prefix}/{name}/tool_point", (1 - within) * points[before] + within * points[after])
 
     def magnify(self, factor: float) -> None:
         """Draws errors larger by another factor."""
         if factor != self.magnification:
-            self.magnification = float(factor)
+            self.magnification = magnification_of(self.course.fine.paths, factor)
             self._draw_lines()
             self.go_to(self.place)
             self.write()
@@ -124,7 +139,7 @@ class LiveView:
         self.write_legend()
 
     def colour_by_error(self, on: bool) -> None:
-        """Gives the lines of the real and of the corrected tool the colours of their errors, or one each."""
+        """Gives the line of the real tool and the arrows the colours of their errors, or one."""
         self.by_error = on
         self._draw_lines()
         self.write()
@@ -141,7 +156,7 @@ class LiveView:
             self.go_to(self.course.share_of(waypoint))
             self._mark(self.course.meant[self.course.fine.waypoint[waypoint]])
         else:
-            self.meshcat.Delete(f"{PREFIX}/warning")
+            self.meshcat.Delete(f"{self._prefix}/warning")
         self.write_place()
         return remarks[chosen].text
 
@@ -162,83 +177,83 @@ class LiveView:
     def write_place(self) -> None:
         """Writes where the arms are; slower than moving them, so it is for the caller to say how often."""
         figure = self._place.figure()
-        draw_place(figure, self.course, self.place, self.chosen)
+        draw_place(figure, self.course, self.place, self.chosen, self._keys)
         self._place.put(figure)
 
     def look(self) -> None:
-        """Turns the camera so that path and arm are beside each other, on a bright background without a grid."""
-        for shown in ("/Grid", "/Axes"):
-            self.meshcat.SetProperty(shown, "visible", False)
-        for key, colour in (("top_color", SKY), ("bottom_color", HORIZON)):
-            self.meshcat.SetProperty("/Background/<object>", key, colour)
-        base = self.robot.X_WB[:3, 3]
-        middle = 0.5 * (self.course.meant.min(axis=0) + self.course.meant.max(axis=0))
-        x, y, _ = middle - base
-        azimuth = np.arctan2(y, x) + VIEW_AZIMUTH_RAD
-        level = np.cos(VIEW_ELEVATION_RAD)
-        direction = np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(VIEW_ELEVATION_RAD)])
-        target = 0.35 * base + 0.65 * middle + np.array([0.0, 0.0, 0.2 * self._size])
-        self.meshcat.SetCameraPose(target + VIEW_DISTANCE * self._size * direction, target)
-
-    @property
-    def own_paths(self) -> tuple[str, ...]:
-        """The arm below the prefix of the host's ``MeshcatVisualizer``: to be hidden, lest it is seen three times."""
-        assert self.robot.place is not None
-        return tuple(body_path(body) for body in moved_bodies(self.robot.place))
+        """Turns the camera so that path and arm are beside each other. Nobody can tell where it was before."""
+        self.meshcat.SetCameraPose(*beginning(self.robot.X_WB[:3, 3], self.course.meant, self._size))
 
     def remove(self) -> None:
-        """Takes all of it away."""
-        self.meshcat.Delete(PREFIX)
-        for pane in (self._legend, self._place):
-            pane.remove()
+        """Takes all of it away, controls too; what was hidden of the host is seen again."""
+        free_spot(self.meshcat, self.spot)
+
+    @property
+    def is_removed(self) -> bool:
+        """Whether it was taken away."""
+        return not holds_spot(self.meshcat, self.spot)
 
     # --- drawing --------------------------------------------------------------------------------------------
+
+    def _make_panes(self) -> tuple[Pane, Pane]:
+        """At the bottom, the legend above the place; those of further views at the top, one below the other."""
+        place_px = STILL_PX if self._keys is None else PLACE_PX
+        both, number = LEGEND_PX[1] + PLACE_PX[1] + 2 * GAP_PX, self.spot.number
+        edge: Literal["top", "bottom"] = "bottom" if number == 0 else "top"
+        first = both * max(number - 1, 0)
+        below, above = (first, first + place_px[1] + GAP_PX), (first + LEGEND_PX[1] + GAP_PX, first)
+        off_place, off_legend = below if number == 0 else above
+        legend = Pane(self.meshcat, f"truepath_legend_{number}", *LEGEND_PX, edge, off_legend)
+        place = Pane(self.meshcat, f"truepath_place_{number}", *place_px, edge, off_place)
+        self.spot.paths += [legend.path, place.path]
+        return legend, place
 
     def _make_arms(self, scene_graph: SceneGraph | None) -> list[tuple[str, DrawnArm, Array, Array]]:
         from pydrake.geometry import Sphere
 
         arms, place = [], self.robot.place
+        assert place is not None
         for name, colour, paint in (
             ("arm_corrected", CORRECTED, None),
             ("arm_uncorrected", UNCORRECTED, _rgba(UNCORRECTED, GHOST_OPACITY)),
         ):
-            if place is not None:
-                path, nothing = f"{PREFIX}/{name}", np.zeros((0, 3))
-                arms.append((name, DrawnArm(self.meshcat, path, place, scene_graph, paint), nothing, nothing))
-                self.meshcat.SetObject(f"{path}/tool_point", Sphere(POINT_SHARE * self._size), _rgba(colour))
+            path, nothing = f"{self._prefix}/{name}", np.zeros((0, 3))
+            arms.append((name, DrawnArm(self.meshcat, path, place, scene_graph, paint), nothing, nothing))
+            self.meshcat.SetObject(f"{path}/tool_point", Sphere(POINT_SHARE * self._size), _rgba(colour))
         return arms
 
     def _draw_what_stays(self) -> None:
         course = self.course
         shades = np.where(course.fine.outside[:, None], unit_rgb(OUTSIDE), unit_rgb(PROGRAMMED))
         self._line("programmed", course.meant[course.kept], shades[course.kept], BAND, far_walls_only=True)
-        self.meshcat.SetProperty(f"{PREFIX}/programmed", "opacity", BAND_OPACITY)
+        self.meshcat.SetProperty(f"{self._prefix}/programmed", "opacity", BAND_OPACITY)
         waypoints = course.fine.waypoint
         some = waypoints[np.unique(np.linspace(0, len(waypoints) - 1, min(len(waypoints), MOST_FRAMES)).astype(int))]
-        draw_frames(self.meshcat, f"{PREFIX}/tool_frames", course.X_WT[some], FRAME_SHARE * self._size)
+        draw_frames(self.meshcat, f"{self._prefix}/tool_frames", course.X_WT[some], FRAME_SHARE * self._size)
         surface = covered_surface(self.robot.region, self.robot.model.robot)
         if surface is not None:
             vertices, faces = np.asfortranarray(moved_points(self.robot.X_WB, surface[0]).T), surface[1].T
             colour = _rgba(REGION, REGION_OPACITY)
             far = type(self.meshcat).SideOfFaceToRender.kBackSide
             faces = np.asfortranarray(faces, np.int32)
-            self.meshcat.SetTriangleMesh(f"{PREFIX}/region", vertices, faces, colour, side=far)
+            self.meshcat.SetTriangleMesh(f"{self._prefix}/region", vertices, faces, colour, side=far)
 
     def _draw_lines(self) -> None:
         course, robot, kept = self.course, self.robot, self.course.kept
         drawn = {}
-        for part, points, errors, colour in (
-            ("real", course.real, course.real_mm, UNCORRECTED),
-            ("corrected", course.corrected, course.corrected_mm, CORRECTED),
+        by_error = error_colours(course.real_mm[kept], self._scale_mm)
+        real_shades = by_error if self.by_error else np.broadcast_to(unit_rgb(UNCORRECTED), by_error.shape)
+        for part, points, shades in (
+            ("real", course.real, real_shades),
+            ("corrected", course.corrected, unit_rgb(CORRECTED)),
         ):
             drawn[part] = course.drawn(points, self.magnification)[kept]
-            shades = error_colours(errors[kept], self._scale_mm) if self.by_error else unit_rgb(colour)
             self._line(f"{part}/line", drawn[part], shades)
             if self._line(f"{part}/hidden", drawn[part], shades):
-                show_through(self.meshcat, f"{PREFIX}/{part}/hidden", HIDDEN_OPACITY)
+                show_through(self.meshcat, f"{self._prefix}/{part}/hidden", HIDDEN_OPACITY)
         some = np.unique(np.linspace(0, len(kept) - 1, MOST_VECTORS).astype(int))
-        ends, path = (course.meant[kept][some], drawn["real"][some]), f"{PREFIX}/error_vectors"
-        draw_arrows(self.meshcat, path, *ends, 0.4 * LINE_SHARE * self._size, unit_rgb(UNCORRECTED))
+        ends, path = (course.meant[kept][some], drawn["real"][some]), f"{self._prefix}/error_vectors"
+        draw_arrows(self.meshcat, path, *ends, 0.4 * LINE_SHARE * self._size, real_shades[some])
         X_BW, q = lie.invert(robot.X_WB), course.fine.q_meant[kept]
         self._arms = [
             (name, arm, joints_reaching(robot.model.robot, moved_points(X_BW, points), course.p_FT, q), points)
@@ -250,13 +265,13 @@ class LiveView:
     ) -> bool:
         radius, piece = width * LINE_SHARE * self._size, self.course.fine.piece[self.course.kept]
         return draw_line(
-            self.meshcat, f"{PREFIX}/{part}", points, radius, colours, piece, far_walls_only=far_walls_only
+            self.meshcat, f"{self._prefix}/{part}", points, radius, colours, piece, far_walls_only=far_walls_only
         )
 
     def _mark(self, p_W: Array) -> None:
         from pydrake.geometry import Sphere
 
-        path = f"{PREFIX}/warning"
+        path = f"{self._prefix}/warning"
         self.meshcat.SetObject(path, Sphere(MARKER_SHARE * self._size), _rgba(OUTSIDE, 0.5))
         self._move(path, p_W)
 
@@ -266,7 +281,7 @@ class LiveView:
         self.meshcat.SetTransform(path, RigidTransform(p_W))
 
     def _set_visible(self, part: str, visible: bool) -> None:
-        self.meshcat.SetProperty(f"{PREFIX}/{part}", "visible", visible)
+        self.meshcat.SetProperty(f"{self._prefix}/{part}", "visible", visible)
 
 
 def _rgba(colour: str, alpha: float = 1.0) -> Rgba:

@@ -22,7 +22,7 @@ CAMERA = "/Cameras/default/rotated/<object>"
 SCREEN_PX = 768  # height of the screen that sizes are meant for; on others everything grows with the height
 HALF_VIEW = np.tan(np.radians(37.5))  # of Meshcat's camera, upwards, at distance 1
 DISTANCE_M = 0.05  # from the camera: nearer than anything else, farther than where the camera begins to see
-MARGIN_PX = 6
+MARGIN_PX = 4
 SHARPNESS = 1.5  # pixels of the picture for one of the screen, which may be finer than most
 DPI = 100
 KEPT, BEHIND = 16, 1.002  # pictures in the tree; how much farther the one before is
@@ -35,8 +35,10 @@ class Pane:
     Attributes:
         meshcat: whose.
         name: of the pane, one word.
-        width_px, height_px: of a screen that is ``SCREEN_PX`` high.
+        width_px, height_px: of a screen that is ``SCREEN_PX`` high. Nobody knows how wide it is: a pane no wider than
+            it is high is seen whole on all but upright ones.
         edge: of the screen, at which it is.
+        off_px: how far from there: what other panes take.
     """
 
     meshcat: Meshcat
@@ -44,6 +46,7 @@ class Pane:
     width_px: int
     height_px: int
     edge: Literal["top", "bottom"]
+    off_px: int = 0
     _count: int = field(default=0, init=False)
 
     @property
@@ -73,7 +76,7 @@ class Pane:
         figure.savefig(picture, format="png")
         per_px = 2.0 * HALF_VIEW * DISTANCE_M / SCREEN_PX
         width, height = per_px * self.width_px, per_px * self.height_px
-        middle = HALF_VIEW * DISTANCE_M - per_px * MARGIN_PX - height / 2.0
+        middle = HALF_VIEW * DISTANCE_M - per_px * (MARGIN_PX + self.off_px) - height / 2.0
         in_view = np.array([0.0, middle if self.edge == "top" else -middle, -DISTANCE_M])
         upright = RollPitchYaw(-np.pi / 2, 0, 0)  # of glTF y is up; Drake turns that into z
         this, before, old = (f"{self.path}/{(self._count - k) % KEPT}" for k in range(3))

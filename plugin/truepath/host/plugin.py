@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -11,9 +11,9 @@ import numpy as np
 from truepath.correct import MAX_CORRECTION_MM, Correction, correct
 from truepath.errors import InputError
 from truepath.host.arm_in_plant import ArmInPlant
-from truepath.host.calibrating import Calibrating
-from truepath.host.context_frames import AppliedFrames, apply_frames, reset_frames
+from truepath.host.context_frames import AppliedFrames, ToolWay, apply_frames, reset_frames
 from truepath.host.placed_robot import PlacedRobot
+from truepath.host.showing import Showing
 from truepath.lie import Array
 
 if TYPE_CHECKING:
@@ -23,15 +23,13 @@ if TYPE_CHECKING:
     from pydrake.systems.framework import Context
     from pydrake.trajectories import Trajectory
 
-    from truepath.host.controls import Controls
-    from truepath.host.live import PathsShown
-    from truepath.preview import PreviewSummary
+    from truepath.guards import Finding
     from truepath.rewriting.options import RewriteOptions
     from truepath.rewriting.rewrite import RewrittenProgram
     from truepath.rewriting.trajectory import CorrectedTrajectory
 
 
-class CalibrationPlugin(Calibrating):
+class CalibrationPlugin(Showing):
     """Calibrates one arm of a host's plant, and corrects what the host wants to send to it.
 
     Works on the host's own finalized plant: the base welded anywhere and in any direction, any tool, other robots and
@@ -43,12 +41,17 @@ class CalibrationPlugin(Calibrating):
         model_instance: which model is the arm, by index or name; found by itself if only one has revolute joints.
         tool_frame: a frame that moves rigidly with the flange, by name or itself: where the tool acts, and the probe
             sits unless stated otherwise. None: the flange itself, and a probe that sits anywhere on it.
-        meshcat: the host's, for ``preview``.
+        meshcat: the host's, for ``preview`` and ``operate``.
         base_frame, flange_frame: names, where they are not the root of the arm's model and a frame called flange,
-            tool0, ee_link or tool_flange.
+            tool0, ee_link or tool_flange. Without such a frame the arm ends at the link that carries the tool frame.
+        scene_graph: with which the plant is registered: ``correct`` then looks for collisions in the host's plant, and
+            ``preview`` and ``operate`` show the shapes of the arm.
+        robot_source: built-in name, URDF or directives that hold the arm, if it came from such a file: saved
+            calibrations name it, so that commands which draw or export the arm need no ``--robot``.
 
     Raises:
-        InputError: no arm or several, a base that moves, a tool that is not fixed to the flange.
+        InputError: no arm or several, a base that moves, a tool that is not fixed to the flange, a gripper that cannot
+            be told from the arm, a source without this arm.
     """
 
     def __init__(
@@ -60,14 +63,25 @@ class CalibrationPlugin(Calibrating):
         meshcat: Meshcat | None = None,
         base_frame: str | None = None,
         flange_frame: str | None = None,
+        scene_graph: SceneGraph | None = None,
+        robot_source: str | Path | None = None,
     ) -> None:
-        super().__init__(ArmInPlant.find(plant, model_instance, tool_frame, base_frame, flange_frame))
-        self.meshcat = meshcat
+        super().__init__(ArmInPlant.find(plant, model_instance, tool_frame, base_frame, flange_frame), meshcat)
+        self.scene_graph = scene_graph
+        if robot_source is not None:
+            self.name_source(robot_source)
 
     # --- correcting -------------------------------------------------------------------------------------
 
     @overload
-    def correct(self, program: str | Path, *, options: RewriteOptions | None = None) -> RewrittenProgram: ...
+    def correct(
+        self,
+        program: str | Path,
+        *,
+        options: RewriteOptions | None = None,
+        context: Context | None = None,
+        collisions: bool = True,
+    ) -> RewrittenProgram: ...
 
     @overload
     def correct(self, program: Array, *, max_correction_mm: float = MAX_CORRECTION_MM) -> Correction: ...
@@ -81,6 +95,8 @@ class CalibrationPlugin(Calibrating):
         max_correction_mm: float = MAX_CORRECTION_MM,
         cell: str | None = None,
         name: str = "trajectory",
+        context: Context | None = None,
+        collisions: bool = True,
     ) -> CorrectedTrajectory: ...
 
     def correct(self, program: Any, **how: Any) -> Any:
@@ -93,6 +109,10 @@ class CalibrationPlugin(Calibrating):
             max_correction_mm: of joints: no commanded position may move further.
             tolerance_mm, max_correction_mm, cell, name: of a trajectory: see
                 ``rewriting.trajectory.correct_trajectory``.
+            context: of a program or a trajectory: of the plant or of the diagram that holds it, for where everything
+                but the arm stands; it is only read. None: as the plant has it by default.
+            collisions: of a program or a trajectory: whether they are looked for, in the host's plant unless a cell is
+                stated. Where that cannot be, a warning says so. Joints alone are not looked at.
 
         Returns:
             For joints a ``Correction``; for a file a ``RewrittenProgram``, of which nothing is written yet; for a
@@ -106,8 +126,11 @@ class CalibrationPlugin(Calibrating):
         if isinstance(program, (str, Path)):
             from truepath.rewriting.rewrite import rewrite_program
 
-            return rewrite_program(program, calibration, **how)
+            options, remarks = self._with_surroundings(how.pop("options", None), how)
+            rewritten = rewrite_program(program, calibration, options, **how)
+            return replace(rewritten, findings=(*rewritten.findings, *remarks))
         if _is_trajectory(program):
+            from truepath.rewriting.options import RewriteOptions
             from truepath.rewriting.trajectory import correct_trajectory
 
             if program.rows() != self.robot.num_joints:
@@ -116,12 +139,36 @@ class CalibrationPlugin(Calibrating):
                     expected=f"{self.robot.num_joints} rows, in the order of plugin.arm",
                     found=str(program.rows()),
                 )
-            return correct_trajectory(program, calibration, **how)
+            options, remarks = self._with_surroundings(RewriteOptions(cell=how.pop("cell", None)), how)
+            corrected = correct_trajectory(
+                program, calibration, cell=options.cell, surroundings=options.surroundings, **how
+            )
+            return replace(corrected, findings=(*corrected.findings, *remarks))
         return correct(calibration.model, program, region=calibration.region.region(), **how)
+
+    def _with_surroundings(
+        self, options: RewriteOptions | None, how: dict[str, Any]
+    ) -> tuple[RewriteOptions, list[Finding]]:
+        """Options that look for collisions in the host's plant, if nowhere else is stated; and what is to be said."""
+        from truepath.host.host_cell import HostCell, host_cell
+        from truepath.rewriting.options import RewriteOptions
+
+        options = RewriteOptions() if options is None else options
+        context, wanted = how.pop("context", None), how.pop("collisions", True)
+        own = None if context is None else self.place.context_of_the_plant(context)
+        if not wanted:
+            return replace(options, cell=None, surroundings=None), []
+        if options.cell is not None or options.surroundings is not None:
+            return options, []
+        calibration = self._in_use()
+        found = host_cell(self.place, calibration.model, calibration.region.region(), self.scene_graph, own)
+        if isinstance(found, HostCell):
+            return replace(options, surroundings=found), []
+        return options, [found]
 
     # --- the real robot in the host ---------------------------------------------------------------------
 
-    def apply(self, context: Context, *, base: bool = True, tool: bool = True) -> AppliedFrames:
+    def apply(self, context: Context, *, base: bool = True, tool: ToolWay = True) -> AppliedFrames:
         """Sets the calibrated frames on a context, so that Drake's own solvers see the real robot.
 
         Inverse kinematics, collision checks and planners that are given this context then work with the real
@@ -132,7 +179,10 @@ class CalibrationPlugin(Calibrating):
         A base whose weld has no frame of its own (``WeldFrames(world, base, X)``) cannot be moved; then the arm from
         its first joint on is put where it really is, and only the body of the base stays as drawn. To have that
         moved too, weld the base to ``plant.AddFrame(FixedOffsetFrame(name, world, X))``. Likewise for a tool: its mount
-        has to be such a frame, or the tool frame itself one.
+        has to be such a frame. If only the tool frame itself is one, it alone is moved, and the tool's shapes stay; if
+        there is none, ``tool=False`` sets all the rest, and ``tool="with flange"`` moves flange and tool as one. A
+        flange that is the last link itself stays as drawn on it; its axis and the tool are right all the same. What
+        was moved is told.
 
         Effects that are no frame cannot be set: ``transmission_error``, ``joint_compliance``, ``backlash``,
         ``encoder_scale``, ``axis_wobble``, ``thermal_expansion``, ``warmup_drift`` and the networks change with the
@@ -142,14 +192,14 @@ class CalibrationPlugin(Calibrating):
 
         Args:
             context: of the plant, or of the diagram that holds it.
-            base, tool: whether to set these; False leaves them as drawn.
+            base, tool: whether to set these; False leaves them as drawn. For the tool also ``with flange``.
 
         Returns:
             What was set, and which effects of this calibration were left out.
 
         Raises:
-            InputError: no calibration; a context of something else; a joint, a flange or a tool whose frame cannot be
-                moved. The frames are then those of the plant's defaults.
+            InputError: no calibration; a context of something else; a joint or a tool whose frame cannot be moved. The
+                frames are then those of the plant's defaults.
         """
         self._in_use()
         own = self.place.context_of_the_plant(context)
@@ -162,116 +212,6 @@ class CalibrationPlugin(Calibrating):
             context: of the plant, or of the diagram that holds it.
         """
         reset_frames(self.place, self.place.context_of_the_plant(context))
-
-    @overload
-    def preview(
-        self,
-        program: str | Path | Array | Trajectory,
-        corrected: Array | None = None,
-        *,
-        magnification: float = 50.0,
-        output: None = None,
-    ) -> PathsShown: ...
-
-    @overload
-    def preview(
-        self,
-        program: str | Path | Array | Trajectory,
-        corrected: Array | None = None,
-        *,
-        magnification: float = 50.0,
-        output: str | Path,
-        robot_source: str | Path,
-    ) -> PreviewSummary: ...
-
-    def preview(
-        self,
-        program: str | Path | Array | Trajectory,
-        corrected: Array | None = None,
-        *,
-        magnification: float = 50.0,
-        output: str | Path | None = None,
-        robot_source: str | Path | None = None,
-    ) -> PathsShown | PreviewSummary:
-        """Shows what the program means, where the real tool would go, and where it will go corrected.
-
-        Args:
-            program: as ``correct`` takes it.
-            corrected: ``(N, n)`` corrected joints, if the program is joints; None: they are worked out.
-            magnification: factor by which errors are drawn.
-            output: HTML page to write; None draws in the host's Meshcat, below ``/truepath``.
-            robot_source: for the page: built-in name, URDF or directives with the shapes of the arm.
-
-        Raises:
-            InputError: neither a Meshcat nor a page; a page without the shapes; as ``correct`` and ``write_preview``.
-        """
-        calibration = self._in_use()
-        from truepath.host.course import shown_path
-
-        shown = shown_path(self, program, corrected)
-        if output is None:
-            from truepath.host.live import show_paths
-
-            return show_paths(self._meshcat(), PlacedRobot.of(self), shown, magnification)
-        if robot_source is None:
-            raise InputError("a page needs the shapes of the arm", expected="robot_source: a built-in name or a URDF")
-        from truepath.preview import write_preview
-
-        return write_preview(
-            output,
-            calibration,
-            shown.q_meant,
-            shown.q_corrected,
-            robot_source=robot_source,
-            magnification=magnification,
-        )
-
-    def operate(
-        self,
-        program: str | Path | Array | Trajectory,
-        corrected: Array | None = None,
-        *,
-        scene_graph: SceneGraph | None = None,
-        magnification: float = 50.0,
-        options: RewriteOptions | None = None,
-        say: Callable[[str], None] = lambda _: None,
-    ) -> Controls:
-        """Draws what ``preview`` draws and the arm twice, today as a ghost and corrected, and adds controls for it.
-
-        In the host's Meshcat an operator then scrubs along the path, plays it, changes the magnification, shows and
-        hides, colours by error and steps through warnings. Nothing happens by itself: the host calls ``poll`` of what
-        is returned in a loop of its own, or ``run``.
-
-        Args:
-            program, corrected: as ``preview``.
-            scene_graph: with which the plant is registered, for the shapes of the arm; None: lines and text only.
-            magnification: factor by which errors are drawn, at the start.
-            options: if the program is a file: see ``RewriteOptions``.
-            say: is told each warning that the operator steps to.
-
-        Raises:
-            InputError: no Meshcat, no calibration, a program that cannot be shown, a magnification below 1.
-            CorrectionError: a guard forbids the correction.
-        """
-        meshcat = self._meshcat()
-        if not 1.0 <= magnification < np.inf:
-            raise InputError("errors cannot be drawn at this scale", expected="1 or more", found=str(magnification))
-        from truepath.host.controls import Controls
-        from truepath.host.course import Course, shown_path
-        from truepath.host.live_view import LiveView
-
-        robot = PlacedRobot.of(self)
-        course = Course.of(robot, shown_path(self, program, corrected, options))
-        name = Path(program).name if isinstance(program, (str, Path)) else "path"
-        title = f"{name} on {self.robot.name}"
-        view = LiveView(meshcat, robot, course, scene_graph=scene_graph, magnification=magnification, title=title)
-        view.look()
-        return Controls(view, say)
-
-    def _meshcat(self) -> Meshcat:
-        if self.meshcat is None:
-            raise InputError("there is nothing to draw in", expected="a meshcat given to the plugin, or an output")
-        return self.meshcat
 
 
 def _is_trajectory(program: Any) -> bool:

@@ -7,9 +7,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,16 +25,14 @@ from truepath.preview.covered import covered_surface
 from truepath.preview.keyframes import animate
 from truepath.preview.page import PageText, render
 from truepath.preview.scene import Drawing, record_scene
-from truepath.preview.shown import ShownPath
-from truepath.preview.toolpaths import FinePaths, nice_magnification
+from truepath.preview.shown import HostTool, ShownPath, require_joints
+from truepath.preview.toolpaths import FinePaths, Magnification, magnification_of
 
 if TYPE_CHECKING:
     from truepath.controller import Controller
     from truepath.rewriting.rewrite import RewrittenProgram
 
-__all__ = ["PreviewSummary", "write_preview", "write_program_preview"]
-
-Magnification = float | Literal["auto"]
+__all__ = ["HostTool", "Magnification", "PreviewSummary", "write_preview", "write_program_preview"]
 
 
 @dataclass(frozen=True)
@@ -75,6 +73,7 @@ def write_preview(
     magnification: Magnification = 50.0,
     title: str = "Path preview",
     labels: Sequence[str] | None = None,
+    tool: HostTool | None = None,
 ) -> PreviewSummary:
     """Writes a self-contained page with the arm, the programmed path and the path of the real robot.
 
@@ -87,19 +86,20 @@ def write_preview(
         magnification: factor by which errors are drawn, or "auto" for a round one that makes them visible.
         title: headline of the page; any text.
         labels: N names of the waypoints, shown while the arm passes them.
+        tool: whose paths are shown; None: the tool point of the calibration.
 
     Raises:
         InputError: joints, labels or magnification that make no sense, a model that cannot be read or that
             is not that of the calibration, or a page that cannot be written.
     """
     q_programmed, q_corrected = np.asarray(q_programmed, float), np.asarray(q_corrected, float)
-    _require_joints(q_programmed, q_corrected, calibration.model.robot.num_joints)
+    require_joints(q_programmed, q_corrected, calibration.model.robot.num_joints)
     if labels is not None and len(labels) != len(q_programmed):
         raise InputError(
             "labels and waypoints differ in number", expected=str(len(q_programmed)), found=str(len(labels))
         )
     shown = ShownPath.of_joints(q_programmed, q_corrected, labels)
-    return _write(Path(output), calibration, shown, robot_source, magnification, title)
+    return _write(Path(output), calibration, shown, robot_source, magnification, title, tool)
 
 
 def write_program_preview(
@@ -112,6 +112,8 @@ def write_program_preview(
     magnification: Magnification = 50.0,
     title: str = "Path preview",
     text: str | None = None,
+    tool: HostTool | None = None,
+    report: str | None = None,
 ) -> PreviewSummary:
     """The same for a corrected program: with its lines, its tool, and what the guards say.
 
@@ -119,6 +121,8 @@ def write_program_preview(
         rewritten: the program; targets that cannot be resolved are not shown.
         controller: of the robot, as it was rewritten for.
         text: of the program as it was, whose lines are shown along with the waypoints; None: only their numbers.
+        tool: whose paths are shown if the program states none; None: the tool point of the calibration.
+        report: name of the report on this calibration, beside the page, to which it links.
 
     Raises:
         InputError: there is no target, or as ``write_preview``.
@@ -126,7 +130,7 @@ def write_program_preview(
     if not len(rewritten.plan):
         raise InputError("there is nothing to show", file=rewritten.file, expected="targets that can be resolved")
     shown = ShownPath.of_program(rewritten, controller, text)
-    return _write(Path(output), calibration, shown, robot_source, magnification, title)
+    return _write(Path(output), calibration, shown, robot_source, magnification, title, tool, report)
 
 
 def _write(
@@ -136,6 +140,8 @@ def _write(
     robot_source: str | Path,
     magnification: Magnification,
     title: str,
+    tool: HostTool | None,
+    report: str | None = None,
 ) -> PreviewSummary:
     model, region = calibration.model, calibration.region.region()
     arm = read_arm(robot_source, model.robot, calibration.robot.name)
@@ -143,12 +149,17 @@ def _write(
     networks = None
     if model.residual is not None:
         networks = NetworksAlong.of(model.residual, shown.q_corrected[shown.waypoint])
+    p_FT, tool_name = model.X_FE[:3, 3], "the tool point of the calibration"
+    if shown.X_FT is not None:
+        p_FT, tool_name = shown.X_FT[:3, 3], "the tool that the program states"
+    elif tool is not None:
+        shown = replace(shown, X_FT=tool.as_it_is(model))
+        p_FT, tool_name = tool.X_FT[:3, 3], tool.name
     fine = FinePaths.of(model, shown, outside)
     at_waypoints = fine.paths.at(fine.waypoint)
     errors = at_waypoints.errors_mm()
     uncorrected, corrected = (ErrorStatistics.of(each) for each in errors)
-    factor = nice_magnification(at_waypoints) if magnification == "auto" else _require_magnification(magnification)
-    p_FT = (model.X_FE if shown.X_FT is None else shown.X_FT)[:3, 3]
+    factor = magnification_of(at_waypoints, magnification)
     frames = animate(model, fine, p_FT, factor)
     covered = covered_surface(region, model.robot)
     scale_mm = scale_end_mm(fine.paths.errors_mm()[0])
@@ -162,7 +173,8 @@ def _write(
         outside=int(outside[shown.waypoint].sum()),
         magnification=factor,
         scale_mm=scale_mm,
-        own_tool=shown.X_FT is not None,
+        tool=tool_name,
+        base_mm=1e3 * model.robot.X_WB[:3, 3],
         uncorrected=uncorrected,
         corrected=corrected,
         model_error=None if calibration.heldout is None else calibration.heldout.calibrated.position_mm,
@@ -170,6 +182,7 @@ def _write(
         networks=networks,
         remarks=remarks,
         has_region=covered is not None,
+        report=report,
     )
     write_atomically(output, render(text, shown, recorded, frames))
     return PreviewSummary(
@@ -184,30 +197,3 @@ def _write(
         networks=networks,
         remarks=len(remarks),
     )
-
-
-def _require_joints(q_programmed: Array, q_corrected: Array, num_joints: int) -> None:
-    for name, q in (("programmed", q_programmed), ("corrected", q_corrected)):
-        if q.ndim != 2 or q.shape[1] != num_joints or len(q) == 0:
-            raise InputError(
-                f"the {name} joints cannot be shown",
-                expected=f"one waypoint or more with {num_joints} joints each",
-                found=f"an array of shape {q.shape}",
-            )
-        if not np.isfinite(q).all():
-            row = int(np.argmin(np.isfinite(q).all(axis=1)))
-            raise InputError(f"the {name} joints are no numbers at waypoint {row + 1}", found=str(q[row]))
-    if len(q_programmed) != len(q_corrected):
-        raise InputError(
-            "programmed and corrected path differ in length",
-            expected=str(len(q_programmed)),
-            found=str(len(q_corrected)),
-        )
-
-
-def _require_magnification(magnification: float | str) -> float:
-    if not isinstance(magnification, (int, float)) or not 0 < magnification <= 1e4:
-        raise InputError(
-            "errors cannot be drawn at this scale", expected="a factor up to 10000", found=str(magnification)
-        )
-    return float(magnification)

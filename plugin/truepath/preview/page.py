@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from truepath.calibration_parts import StatisticsPart
 from truepath.iso9283 import ErrorStatistics
+from truepath.lie import Array
 from truepath.look import stylesheet
 from truepath.networks_along import NetworksAlong
 from truepath.preview import colours, scene
@@ -35,13 +37,15 @@ class PageText:
         waypoints, outside: how many there are, and how many lie outside the calibrated region.
         magnification: factor by which errors are drawn.
         scale_mm: error at the end of the colour bar.
-        own_tool: whether the paths are those of the tool that the program states.
+        tool: whose paths these are.
+        base_mm: ``(3,)`` where the robot's base is in the world, mm.
         uncorrected, corrected: predicted errors at the waypoints, mm.
         model_error: errors of the calibrated model itself on poses it had not seen, mm; None if unknown.
         missing_meshes: what could not be drawn.
         networks: what they say at the waypoints; None where the calibration has none.
         remarks: what to look at.
         has_region: whether the calibrated region is drawn.
+        report: page beside this one that says what is wrong with the robot; None: there is none.
     """
 
     title: str
@@ -51,7 +55,8 @@ class PageText:
     outside: int
     magnification: float
     scale_mm: float
-    own_tool: bool
+    tool: str
+    base_mm: Array
     uncorrected: ErrorStatistics
     corrected: ErrorStatistics
     model_error: StatisticsPart | None
@@ -59,6 +64,7 @@ class PageText:
     networks: NetworksAlong | None
     remarks: tuple[Remark, ...]
     has_region: bool
+    report: str | None = None
 
 
 def render(text: PageText, shown: ShownPath, recorded: RecordedScene, frames: KeyFrames) -> str:
@@ -122,8 +128,9 @@ def _notes(text: PageText) -> list[tuple[str, str]]:
             f"{text.model_error.max:.3f} mm (max) on measured poses that it had not seen."
         )
     notes.append(("", predicted))
-    tool = "the tool that the program states" if text.own_tool else "the tool point of the calibration"
-    notes.append(("", f"Paths are those of {tool}. Grid 100 mm; the large axes are the robot base frame."))
+    base = ", ".join(f"{value + 0.0:.0f}" for value in np.round(text.base_mm))
+    grid = f"Grid 100 mm, level. The large axes are the robot base frame, at ({base}) mm in the world"
+    notes.append(("", f"Paths are those of {text.tool}. {grid}."))
     if text.missing_meshes:
         notes.append((" warning", "Not drawn, file not readable: " + ", ".join(text.missing_meshes)))
     return notes

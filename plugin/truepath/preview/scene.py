@@ -35,6 +35,7 @@ __all__ = ["CORRECTED", "PROGRAMMED", "UNCORRECTED", "Drawing", "record_scene", 
 
 MOST_ERROR_ARROWS, MOST_TOOL_FRAMES = 66, 24
 VIEW_POSTURES, VIEW_LINE_POINTS = 60, 300
+BELOW_BASE = 0.05  # of the scene's size: what reaches further down than the base has the grid below it
 VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD = np.radians(-55.0), np.radians(24.0)  # azimuth from where the path lies
 
 ROOT = "truepath"
@@ -70,7 +71,7 @@ class Drawing:
 
 
 def record_scene(drawing: Drawing) -> RecordedScene:
-    """Everything that is to be seen, in the robot base frame but with the world's up as up."""
+    """Everything that is to be seen, in the world, with the robot's base where it really is."""
     arm, fine, frames, model = drawing.arm, drawing.fine, drawing.frames, drawing.model
     paths = fine.paths.magnified(drawing.magnification)
     postures = np.concatenate([frames.q_corrected, frames.q_uncorrected])
@@ -79,9 +80,10 @@ def record_scene(drawing: Drawing) -> RecordedScene:
 
     recorded = RecordedScene()
     stage = Stage(Visualizer.view_into(recorded, ScenePath((ROOT,))), size)
-    X_up = lie.make_pose(model.robot.X_WB[:3, :3])
-    stage.root.set_transform(X_up)
-    stage.surroundings()
+    X_WB = model.robot.X_WB @ lie.invert(model.goal_frames()[0])
+    stage.root.set_transform(X_WB)
+    lowest = float((np.concatenate([bodies, paths.goal]) @ X_WB[2, :3]).min())
+    stage.surroundings(X_WB[:3, :3], lowest if lowest < -BELOW_BASE * size else 0.0)
     if model.residual is not None:  # before the paths: what is transparent is drawn in the order in which it came
         _draw_sleeve(stage, fine, NetworksAlong.of(model.residual, fine.q_corrected))
     _draw_paths(stage, drawing)
@@ -91,13 +93,13 @@ def record_scene(drawing: Drawing) -> RecordedScene:
     if drawing.covered is not None:
         stage.veil(REGION_COVERED, *drawing.covered, REGION)
         corners = drawing.covered[0]
-        recorded.region_points = corners[_evenly(len(corners), VIEW_LINE_POINTS)] @ X_up[:3, :3].T
+        recorded.region_points = corners[_evenly(len(corners), VIEW_LINE_POINTS)] @ X_WB[:3, :3].T + X_WB[:3, 3]
 
     lines = np.concatenate([paths.goal, paths.uncorrected, paths.corrected])
     lines = lines[_evenly(len(lines), VIEW_LINE_POINTS)]
-    recorded.path_points = lines @ X_up[:3, :3].T
-    recorded.arm_points = np.concatenate([bodies, lines]) @ X_up[:3, :3].T
-    recorded.view_direction = _view_direction(X_up[:3, :3] @ paths.goal.mean(axis=0))
+    recorded.path_points = lines @ X_WB[:3, :3].T + X_WB[:3, 3]
+    recorded.arm_points = np.concatenate([bodies, lines]) @ X_WB[:3, :3].T + X_WB[:3, 3]
+    recorded.view_direction = _view_direction(X_WB[:3, :3] @ paths.goal.mean(axis=0))
     at_zero = joint_transforms(arm, np.zeros(len(arm.link_transforms) - 1))
     recorded.joint_quaternions = lie.to_quaternion(at_zero[:, :3, :3])[:, [1, 2, 3, 0]]
     return recorded

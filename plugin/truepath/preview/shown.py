@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepath import lie
+from truepath.errors import InputError
 from truepath.lie import Array
+from truepath.model import CalibratedModel
 from truepath.programs.motions import Kind
 from truepath.region import Region
 
@@ -29,6 +32,23 @@ class Remark:
 
     text: str
     waypoint: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class HostTool:
+    """The tool of a host, whose paths are shown where the path itself states none.
+
+    Attributes:
+        X_FT: ``(4, 4)`` where it is mounted on the flange, as drawn.
+        name: in words.
+    """
+
+    X_FT: Array
+    name: str
+
+    def as_it_is(self, model: CalibratedModel) -> Array:
+        """``(4, 4)`` where it is on the real flange: what that is known to be off, the tool is too."""
+        return lie.invert(model.goal_frames()[1]) @ self.X_FT
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +152,28 @@ class ShownPath:
         )
 
 
+def require_joints(q_programmed: Array, q_corrected: Array, num_joints: int) -> None:
+    """Raises ``InputError`` unless both are ``(N, n)`` numbers of the robot, N being one or more."""
+    for name, q in (("programmed", q_programmed), ("corrected", q_corrected)):
+        if q.ndim != 2 or q.shape[1] != num_joints or len(q) == 0:
+            raise InputError(
+                f"the {name} joints cannot be shown",
+                expected=f"one waypoint or more with {num_joints} joints each",
+                found=f"an array of shape {q.shape}",
+            )
+        if not np.isfinite(q).all():
+            row = int(np.argmin(np.isfinite(q).all(axis=1)))
+            raise InputError(f"the {name} joints are no numbers at waypoint {row + 1}", found=str(q[row]))
+    if len(q_programmed) != len(q_corrected):
+        raise InputError(
+            "programmed and corrected path differ in length",
+            expected=str(len(q_programmed)),
+            found=str(len(q_corrected)),
+        )
+
+
 def _remarks(rewritten: RewrittenProgram, line: Array) -> tuple[Remark, ...]:
-    """Each finding, worst level first and in the order of the lines, then what the correction says of all of it."""
+    """Each finding, worst level first and in the order of the lines, what the correction says, what stays as it is."""
 
     def waypoint(where: int | None) -> int | None:
         if where is None:
@@ -149,6 +189,9 @@ def _remarks(rewritten: RewrittenProgram, line: Array) -> tuple[Remark, ...]:
     for sentence in rewritten.correction.warnings:
         place = re.search(r"in line (\d+)", sentence)
         found.append(Remark(sentence, waypoint(int(place[1]) if place else None)))
+    found += [
+        Remark(f"line {each.line} stays as it is: {each.why}", waypoint(each.line)) for each in rewritten.unresolved
+    ]
     return tuple(found)
 
 

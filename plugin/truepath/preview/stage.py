@@ -69,8 +69,13 @@ class Stage:
         """The colours of the vertices, which no light changes."""
         return self.material(mg.MeshBasicMaterial, 0xFFFFFF, vertexColors=True, **{"side": 2, **options})
 
-    def surroundings(self) -> None:
-        """Background, floor grid and the axes of the base frame, in place of what meshcat shows by itself."""
+    def surroundings(self, R_WB: Array, grid_m: float) -> None:
+        """Background, a level grid and the axes of the base frame, in place of what meshcat shows by itself.
+
+        Args:
+            R_WB: ``(3, 3)`` how the base stands in the world.
+            grid_m: height of the grid above the base.
+        """
         window = self.root.window
         for name, key, value in (
             ("Background", "top_color", SKY),
@@ -80,7 +85,8 @@ class Stage:
         ):
             Visualizer.view_into(window, ScenePath((name,))).set_property(key, value)
         material = self.material(mg.LineBasicMaterial, rgb(GRID_COLOUR), opacity=0.6)
-        self.put(self.root["floor"], line_segments(*grid_lines(1.1 * self.size, GRID_CELL_M), material))
+        lines = line_segments(*grid_lines(1.1 * self.size, GRID_CELL_M), material)
+        self.put(self.root["floor"], lines, lie.make_pose(R_WB.T, grid_m * R_WB[2]))
         self.frames("base_axes", np.eye(4)[None], 0.2 * self.size, 0.003 * self.size)
 
     def frames(self, name: str, X: Array, length_m: float, radius_m: float) -> None:

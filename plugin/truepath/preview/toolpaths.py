@@ -6,9 +6,12 @@ All points are those of one tool point in the robot base frame B: that of the pr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
+from typing import Literal
 
 import numpy as np
 
+from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.model import CalibratedModel, nominal_flange_poses
 from truepath.preview.shown import ShownPath
@@ -19,6 +22,9 @@ MOST_PARTS = 60
 MOST_FINE_ROWS = 60_000  # beyond that no rows are added between those of the path
 DRAWN_ERROR_SHARE = 0.09  # of what is seen, for the automatic magnification
 NICE_FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+LARGEST_FACTOR = 1e4
+
+Magnification = float | Literal["auto"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +143,21 @@ class FinePaths:
             outside[np.round(position).astype(int)],
             np.searchsorted(position, shown.waypoint - 1e-9),
         )
+
+
+def magnification_of(paths: Toolpaths, wanted: Magnification) -> float:
+    """The factor by which errors are drawn: as wanted, or a round one for these paths.
+
+    Raises:
+        InputError: no factor above 0 and up to 10,000, nor "auto".
+    """
+    if wanted == "auto":
+        return nice_magnification(paths)
+    if not isinstance(wanted, Real) or not 0 < wanted <= LARGEST_FACTOR:
+        raise InputError(
+            "errors cannot be drawn at this scale", expected="a factor above 0, up to 10000, or auto", found=str(wanted)
+        )
+    return float(wanted)
 
 
 def nice_magnification(paths: Toolpaths) -> float:

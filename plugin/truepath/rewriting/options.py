@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from truepath.controller import NOMINAL
 from truepath.correct import MAX_CORRECTION_MM
 from truepath.guards import MAX_AGE_DAYS
+
+if TYPE_CHECKING:
+    from truepath.posed_cell import Surroundings
 
 PATH_TOLERANCE_MM = 0.05
 
@@ -23,6 +26,7 @@ class RewriteOptions:
             added on the way; None: nothing is added.
         max_correction_mm: no target may move further.
         cell: model of the cell in which collisions are looked for; None: nowhere.
+        surroundings: the same in memory, as a host has it; it takes the place of ``cell``.
         start_rad: joints from which the program starts, where its first target is a pose.
         tool: TCP in force before the program sets one: position in m, rotation vector in rad, on the tool flange.
         max_age_days: a calibration older than this is worth a warning.
@@ -33,6 +37,7 @@ class RewriteOptions:
     path_tolerance_mm: float | None = PATH_TOLERANCE_MM
     max_correction_mm: float = MAX_CORRECTION_MM
     cell: str | None = None
+    surroundings: Surroundings | None = None
     start_rad: tuple[float, ...] | None = None
     tool: tuple[float, ...] | None = None
     max_age_days: int = MAX_AGE_DAYS

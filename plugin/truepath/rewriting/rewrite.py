@@ -170,7 +170,7 @@ def rewrite(
         *doubtful_findings(
             plan, motions.possible, X_end, model, controller, tolerance_mm, options.max_correction_mm, file
         ),
-        *watch(plan, correction.q_rad, ways, calibration, options.cell),
+        *watch(plan, correction.q_rad, ways, calibration, options.surroundings or options.cell),
     ]
     _refuse(findings, file)
     say("writing")
@@ -194,7 +194,7 @@ def rewrite(
         vias=vias,
         unresolved=tuple(sorted([*program.unresolved, *_without_posture(program, plan)], key=lambda each: each.line)),
         findings=tuple(findings),
-        cell=options.cell,
+        cell=options.cell if options.surroundings is None else str(options.surroundings),
     )
 
 

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial, Trajectory
     from scipy.interpolate import CubicSpline
 
+    from truepath.posed_cell import Surroundings
+
 LEAST_SAMPLES, MOST_SAMPLES = 9, 200_000
 FIRST_STEP_RAD = 0.1  # a wave of 20 cycles a turn is seen by three samples
 NEARLY = 0.8  # of the tolerance, above which a sample is added: a spline moves a little with every one
@@ -98,6 +100,7 @@ def correct_trajectory(
     tolerance_mm: float = PATH_TOLERANCE_MM,
     max_correction_mm: float = MAX_CORRECTION_MM,
     cell: str | None = None,
+    surroundings: Surroundings | None = None,
     name: str = "trajectory",
     today: date | None = None,
 ) -> CorrectedTrajectory:
@@ -109,6 +112,7 @@ def correct_trajectory(
         tolerance_mm: how far the tool may be off between samples, as predicted.
         max_correction_mm: no sample may move further.
         cell: model of the cell in which collisions are looked for; None: nowhere.
+        surroundings: the same in memory, as a host has it.
         name: for messages.
         today: in UTC, for the age of the calibration; default: today.
 
@@ -124,7 +128,9 @@ def correct_trajectory(
     pieces = pieces_of(trajectory, model.robot.num_joints, name)
     time_s = _samples(model, pieces, tolerance_mm, max_correction_mm, name)
     program = SampledTrajectory(name, time_s, pieces.values(time_s))
-    options = RewriteOptions(path_tolerance_mm=None, max_correction_mm=max_correction_mm, cell=cell)
+    options = RewriteOptions(
+        path_tolerance_mm=None, max_correction_mm=max_correction_mm, cell=cell, surroundings=surroundings
+    )
     try:
         rewritten = rewrite(program, calibration, controller_of(model.robot), options, today=today)
     except CorrectionError as error:

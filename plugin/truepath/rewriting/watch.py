@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +15,17 @@ from truepath.rates import joint_motions, rate_findings, servo_motions, tool_mot
 from truepath.rewriting.plan import Plan
 from truepath.rewriting.ways import Ways
 
+if TYPE_CHECKING:
+    from truepath.posed_cell import Surroundings
+
 QUARTERS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 STEP_RAD, MOST_STEPS = 0.1, 64  # between postures that are looked at on the way of a motion of the joints
 SERVO_PERIOD_S = 0.002  # of servoj, where none is stated
 
 
-def watch(plan: Plan, q_corrected_rad: Array, ways: Ways, calibration: Calibration, cell: str | None) -> list[Finding]:
+def watch(
+    plan: Plan, q_corrected_rad: Array, ways: Ways, calibration: Calibration, cell: str | Surroundings | None
+) -> list[Finding]:
     """Joint limits of speed and acceleration along all motions whose start is known, and collisions in a cell."""
     findings = _rates_of_joints(plan, q_corrected_rad, calibration)
     findings += _rates_of_the_tool(plan, q_corrected_rad, ways, calibration)
@@ -74,7 +80,9 @@ def _at_quarters(q_ends: Array, q_samples: Array, ways: Ways, kept: Array) -> Ar
     return q
 
 
-def _room(plan: Plan, q_corrected_rad: Array, ways: Ways, calibration: Calibration, cell: str) -> list[Finding]:
+def _room(
+    plan: Plan, q_corrected_rad: Array, ways: Ways, calibration: Calibration, cell: str | Surroundings
+) -> list[Finding]:
     from truepath.clearance import Cell
     from truepath.closer import clearance_findings, compare
 
