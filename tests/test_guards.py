@@ -82,6 +82,14 @@ def test_another_robot_is_an_error(calibration, name):
     assert "'ur5'" in finding.message
 
 
+@pytest.mark.parametrize(("called", "level"), [("right::ur5", None), ("left::ur10", "error"), ("welder", "warning")])
+def test_in_a_host_a_robot_may_have_a_scope_or_any_name(calibration, called, level):
+    dated = made(calibration, "2026-11-01T00:00:00+00:00")
+    renamed = dated.model_copy(update={"robot": dated.robot.model_copy(update={"name": called})})
+    found = calibration_findings(renamed, "UR5", TODAY)
+    assert [finding.level for finding in found] == ([] if level is None else [level])
+
+
 @pytest.mark.parametrize(
     ("created", "age"),
     [

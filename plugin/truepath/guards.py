@@ -13,6 +13,7 @@ from truepath.calibration import Calibration
 
 MAX_AGE_DAYS = 365
 LEVELS = ("error", "warning")
+TYPE_OF_UR = re.compile(r"ur\d+e?")
 
 
 @dataclass(frozen=True)
@@ -79,15 +80,17 @@ def calibration_findings(
     Args:
         calibration: as loaded; its date is the UTC day on which the file was created.
         robot_named_in_program: None where the program names none. Case, spaces and punctuation do not count:
-            "UR5", "ur-5" and "ur5" are one robot, "UR5e" is another.
+            "UR5", "ur-5" and "ur5" are one robot, "UR5e" is another. In a Drake host a robot may have any name, which
+            says nothing of its type: that is a warning.
         today: in UTC.
         max_age_days: a calibration older than this is a warning; a robot's gears and its cell change with time.
     """
     findings = _age_findings(calibration, today, max_age_days)
-    name = calibration.robot.name
+    name = calibration.robot.name.rsplit("::", 1)[-1]  # in a Drake host scopes stand before it
     if robot_named_in_program is not None and _bare(robot_named_in_program) != _bare(name):
         message = f"the program is for {robot_named_in_program!r}, the calibration is one of {name!r}"
-        findings.append(Finding("error", "robot", None, message))
+        known = TYPE_OF_UR.search(_bare(name)) is not None
+        findings.append(Finding("error" if known else "warning", "robot", None, message))
     return findings
 
 
