@@ -49,7 +49,7 @@ def names_of_headings(page: Path) -> set[str]:
 
 
 def test_all_pages_are_there_and_the_index_leads_to_them():
-    wanted = {"measure", "calibrate", "read-a-report", "correct-a-program", "use-inside-drake"}
+    wanted = {"measure", "calibrate", "read-a-report", "correct-a-program", "deploy", "use-inside-drake"}
     wanted |= {"add-an-effect", "add-a-program-format", "explanation"}
     assert {page.stem for page in PAGES} == {"README", *wanted}
     assert {f"{name}.md" for name in wanted} <= set(LINK.findall(text_of(DOCS / "README.md")))

@@ -71,6 +71,13 @@ def swept_joints(search: Search) -> list[int]:
     return found
 
 
+def all_confusions(search: Search, kinematic: KinematicFit, named: tuple[Term, ...]) -> list[Confusion]:
+    """Whatever the data cannot tell apart: findings ``named``, what geometry hides, the common length."""
+    found = confusions_of_findings(search, named)
+    others = (hidden_behind_geometry(search), common_length(search, kinematic))
+    return found + [confusion for confusion in others if confusion is not None]
+
+
 def confusions_of_findings(search: Search, terms: tuple[Term, ...]) -> list[Confusion]:
     """Findings that another cause explains about as well. ``search`` comes back with all terms in its model."""
     found, swept = [], swept_joints(search)

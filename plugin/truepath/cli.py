@@ -8,7 +8,16 @@ from typing import Annotated
 
 import typer
 
-from truepath import __version__, cli_learning, cli_programs, cli_virtual
+from truepath import (
+    __version__,
+    cli_controller,
+    cli_deploy,
+    cli_learning,
+    cli_plan,
+    cli_programs,
+    cli_record,
+    cli_virtual,
+)
 from truepath.errors import TruepathError
 
 app = typer.Typer(
@@ -36,14 +45,18 @@ def options(
     """Measure a robot, learn where it really goes, correct its offline programs, prove the gain."""
 
 
-for command in (
+for command in (  # in the order of the flow
+    cli_plan.plan,
+    cli_record.record,
     cli_learning.calibrate,
     cli_learning.diagnose,
     cli_learning.validate,
     cli_programs.correct,
     cli_programs.preview,
+    cli_deploy.deploy,
     cli_programs.export,
     cli_virtual.simulate,
+    cli_controller.controller,
     cli_virtual.demo,
 ):
     app.command()(command)

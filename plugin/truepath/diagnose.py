@@ -196,12 +196,15 @@ def _ambiguities(
 ) -> list[Ambiguity]:
     found: list[Ambiguity] = []
     for confusion in evidence.confusions:
-        poses = None
+        driven = None
         if plan:
             progress("planning what to measure next")
-            poses = poses_that_tell(kinematic, evidence.fit, confusion, spec)
-        name = None if poses is None else ("poses.csv" if not found else f"poses{len(found) + 1}.csv")
-        found.append(Ambiguity(confusion.effects, confusion.why, poses, name))
+            driven = poses_that_tell(kinematic, evidence.fit, confusion, spec)
+        if driven is None:
+            found.append(Ambiguity(confusion.effects, confusion.why))
+            continue
+        name = "poses.csv" if not found else f"poses{len(found) + 1}.csv"
+        found.append(Ambiguity(confusion.effects, confusion.why, driven.q_rad[driven.measure], name, driven))
     return found
 
 

@@ -17,6 +17,7 @@ from truepath.measurements import Measurements
 from truepath.model import CalibratedModel
 
 if TYPE_CHECKING:
+    from truepath.planning.pose_list import PoseList
     from truepath.residual.decision import Decision
 
 SCHEMA = "truepath.diagnosis/1"
@@ -86,12 +87,14 @@ class Ambiguity:
         why: what a reader needs to know.
         poses: ``(k, n)`` joints that would separate them, rad, or None where poses alone cannot.
         measure_next: name of the file with these poses, in the folder of the diagnosis.
+        driven: what is in that file: the same poses, and rows to pass through on the way.
     """
 
     effects: tuple[str, ...]
     why: str
     poses: Array | None = None
     measure_next: str | None = None
+    driven: PoseList | None = None
 
 
 @dataclass(frozen=True)

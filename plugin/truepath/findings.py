@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepath.ambiguity import Confusion, common_length, confusions_of_findings, hidden_behind_geometry
+from truepath.ambiguity import Confusion, all_confusions
 from truepath.calibrate import KinematicFit
 from truepath.choose import choose
 from truepath.effect_fit import EffectFit, fit_effects
@@ -63,9 +63,7 @@ def gather(kinematic: KinematicFit, visits: Array, progress: Progress = lambda _
     progress("looking for what could stand in for it")
     search = Search(kinematic.fit, context, fit)
     named = tuple(term for term in fit.terms if term.effect in EFFECTS)
-    confusions = [*confusions_of_findings(search, named)]
-    others = (hidden_behind_geometry(search), common_length(search, kinematic))
-    confusions += [confusion for confusion in others if confusion is not None]
+    confusions = all_confusions(search, kinematic, named)
     withdrawn = {confusion.withdrawn for confusion in confusions}
     proved = tuple(term for term in named if term.effect not in withdrawn)
     found = fit_effects(kinematic.fit, context, proved, prune=False, start=fit)

@@ -86,11 +86,11 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
     Returns:
         What was written; ``diagnosis.json`` comes last, so that it never names a file that is not there.
     """
-    from truepath.next_poses import to_csv
+    from truepath.planning.pose_list import to_csv
     from truepath.report import write_report
 
     files = [folder / name for name in ("calibration.json", "report.html")]
-    poses = {folder / item.measure_next: item.poses for item in diagnosis.ambiguous if item.measure_next}
+    poses = {folder / item.measure_next: item.driven for item in diagnosis.ambiguous if item.measure_next}
     files += [*poses, folder / "diagnosis.json"]
     require_folder(folder, files, data)
     try:
@@ -100,9 +100,9 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, data: Path) -> list[Path
         raise InputError("the folder cannot be made", file=folder, expected="a place to write to", found=why) from None
     diagnosis.calibration.save(files[0])
     write_report(files[1], diagnosis)
-    for file, q_rad in poses.items():
-        assert q_rad is not None
-        write_atomically(file, to_csv(q_rad))
+    for file, driven in poses.items():
+        assert driven is not None
+        write_atomically(file, to_csv(driven))
     diagnosis.save(files[-1])
     return files
 

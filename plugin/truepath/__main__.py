@@ -1,0 +1,5 @@
+"""``python -m truepath`` is the command ``truepath``."""
+
+from truepath.cli import main
+
+main()

@@ -1,0 +1,217 @@
+"""Sends a program and watches it until it ends, one way or another; the robot never moves on unwatched."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from truepath.deploying.passages import Passages
+from truepath.deploying.run_file import RunFile
+from truepath.lie import Array
+from truepath.robot_link import RobotFault, RobotLink, RobotState
+from truepath.robot_link.readiness import MODES
+from truepath.robot_link.state import RUNNING_MODE
+
+LOOK_EVERY_S = 0.04
+START_S = 10.0  # within which a program must be seen to run
+AFTERWARDS_S = 0.3  # the arm settles a moment later than the program ends
+MOVED_RAD = 1e-6
+STOP_TRIED_S = 10.0
+STANDS_RAD_S = 0.01
+PAUSED = "PAUSED"
+
+
+class Watched(Protocol):
+    """What is told about a program while it runs."""
+
+    def __call__(self, passed: int, state: RobotState) -> None:
+        """How many targets are passed, and the newest sample."""
+
+
+@dataclass(eq=False)
+class Followed:
+    """How a run went.
+
+    Attributes:
+        ended: ``"completed"``, or what stopped it, in words.
+        completed: the program ran to its end.
+        interrupted: by Ctrl-C.
+        duration_s: of the program, by the controller's clock.
+        samples: how many were seen.
+        lag_rad: largest difference of actual and target joints.
+        gap_s: longest time between two samples, by the controller's clock.
+        last: newest sample; None if there was none.
+    """
+
+    ended: str = ""
+    completed: bool = False
+    interrupted: bool = False
+    duration_s: float = 0.0
+    samples: int = 0
+    lag_rad: float = 0.0
+    gap_s: float = 0.0
+    last: RobotState | None = None
+
+
+def send_and_follow(
+    link: RobotLink, text: str, passages: Passages, record: RunFile, stall_s: float, watched: Watched
+) -> Followed:
+    """Runs a program on a robot that was found ready.
+
+    Whatever ends this before the program ends, the robot is told to stop.
+
+    Args:
+        link: to the robot.
+        text: of the program.
+        passages: of its targets.
+        record: gets every sample.
+        stall_s: the robot may stand for so long while its program runs.
+        watched: is told how it goes.
+
+    Raises:
+        RobotFault: the program could not be sent; nothing has moved.
+    """
+    run = _Run(link, passages, record, watched)
+    link.state()
+    link.samples()
+    try:
+        link.send_program(text)
+    except BaseException:
+        with contextlib.suppress(RobotFault):
+            link.stop()
+        raise
+    try:
+        run.until_started()
+        run.until_ended(stall_s)
+    except RobotFault as fault:
+        run.stopped(fault.reason)
+    except KeyboardInterrupt:
+        run.followed.interrupted = True
+        run.stopped("stopped by Ctrl-C")
+    except BaseException:
+        run.stopped("stopped")
+        raise
+    finally:
+        run.finish()
+    return run.followed
+
+
+class _Run:
+    def __init__(self, link: RobotLink, passages: Passages, record: RunFile, watched: Watched) -> None:
+        self.link, self.passages, self.record, self.watched = link, passages, record, watched
+        self.followed = Followed()
+        self.started_s: float | None = None
+        self.q_target: Array | None = None
+        self.moved_s = time.monotonic()
+
+    def until_started(self) -> None:
+        """The port does not answer: that the program has begun shows in the samples."""
+        end = time.monotonic() + START_S
+        while self.started_s is None:
+            self.look()
+            if time.monotonic() > end:
+                raise RobotFault(f"the robot has not started the program within {START_S:.0f} s: is it valid for it?")
+
+    def until_ended(self, stall_s: float) -> None:
+        while True:
+            state = self.look()
+            if not state.program_running and not self.is_paused():
+                break
+            if time.monotonic() - self.moved_s > stall_s:
+                raise RobotFault(f"the robot has stood for {stall_s:.0f} s while its program runs")
+        time.sleep(AFTERWARDS_S)
+        self.look()
+        self.followed.ended, self.followed.completed = "completed", True
+
+    def look(self) -> RobotState:
+        """Takes in what has arrived.
+
+        Raises:
+            RobotFault: the robot was stopped, or is lost.
+        """
+        time.sleep(LOOK_EVERY_S)
+        try:
+            state, samples = self.link.state(), self.link.samples()
+        except RobotFault as fault:
+            raise RobotFault(f"the connection was lost ({fault.reason})") from None
+        self.take(samples)
+        if not state.able_to_move:
+            raise RobotFault(_why_unable(state))
+        return state
+
+    def take(self, samples: list[RobotState]) -> None:
+        if not samples:
+            return
+        time_s = np.array([each.time_s for each in samples])
+        q = np.array([each.q_rad for each in samples])
+        q_target = np.array([each.q_target_rad for each in samples])
+        running = np.array([each.program_running for each in samples])
+        followed = self.followed
+        before = time_s[:1] if followed.last is None else [followed.last.time_s]
+        followed.gap_s = max(followed.gap_s, float(np.diff(time_s, prepend=before).max()))
+        followed.last = samples[-1]
+        followed.samples += len(samples)
+        followed.lag_rad = max(followed.lag_rad, float(np.abs(q - q_target).max()))
+        if self.started_s is None and running.any():
+            self.started_s = float(time_s[np.argmax(running)])
+        if self.started_s is not None:
+            if running.any():
+                followed.duration_s = float(time_s[running][-1]) - self.started_s
+            self.passages.take(time_s, q)
+        if self.q_target is None or np.abs(q_target - self.q_target).max() > MOVED_RAD:
+            self.moved_s = time.monotonic()
+        self.q_target = q_target[-1]
+        self.record.append(time_s, self.passages.count, q, q_target)
+        self.watched(self.passages.count, samples[-1])
+
+    def is_paused(self) -> bool:
+        """On the pendant; then it may go on."""
+        try:
+            return self.link.dashboard("programState").upper().startswith(PAUSED)
+        except RobotFault:
+            return False
+
+    def stopped(self, why: str) -> None:
+        """Whatever it was: makes sure that the robot stands, as far as possible, and says what is known."""
+        self.followed.ended = why
+        end = time.monotonic() + STOP_TRIED_S
+        while True:
+            try:
+                self.link.stop()
+                break
+            except RobotFault as fault:
+                if time.monotonic() > end:
+                    self.followed.ended += (
+                        f"; it could not be told to stop ({fault.reason}): whether it still moves is not known"
+                    )
+                    return
+                time.sleep(LOOK_EVERY_S)
+        self.followed.ended += "; it was told to stop" + self._standing()
+
+    def _standing(self) -> str:
+        """What is seen of a robot that was told to stop."""
+        end = time.monotonic() + STOP_TRIED_S
+        try:
+            while np.abs(self.link.state().speed_rad_s).max() > STANDS_RAD_S:
+                if time.monotonic() > end:
+                    return ", and still moves"
+                time.sleep(LOOK_EVERY_S)
+            self.take(self.link.samples())
+        except RobotFault:
+            return ", but cannot be seen"
+        return " and stands"
+
+    def finish(self) -> None:
+        if self.followed.last is not None:
+            last = self.followed.last
+            self.passages.take(np.array([last.time_s]), last.q_rad[None], ended=True)
+
+
+def _why_unable(state: RobotState) -> str:
+    if state.robot_mode != RUNNING_MODE and state.safety == "normal":
+        return f"the robot stopped: robot mode {MODES.get(state.robot_mode, state.robot_mode)}"
+    return f"the robot stopped: {state.safety.replace('_', ' ')}"

@@ -1,0 +1,129 @@
+r"""In which order to visit poses: short ways, and nothing of the poses that goes along with time.
+
+A robot that warms up, or a tracker that sinks, adds an error that grows with time. It can be told from an error that
+goes with the poses only if time does not: if the correlation of the order with every joint angle, and with every
+derivative of the readings, is small. The order is found by simulated annealing (Kirkpatrick 1983) of 2-opt moves on
+
+.. math:: \sum d_{k,k+1} / d_0 + w \sum_j \max(0, |r_j| - r_0)^2 + w \sum \max(0, g_0 - g)^2
+
+d being the ways, :math:`d_0` a short tour, :math:`r_j` the correlations, g the gap between two visits of a pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepath.lie import Array
+
+CORRELATION = 0.10  # no more of it costs anything
+WEIGHT = 20.0
+LEAST_GAP = 1.0 / 3.0  # of the campaign, between two visits of a pose
+MOVES_PER_STOP, MOST_MOVES = 700, 80_000
+HOT, COLD = 0.05, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Mixing:
+    """How far an order tells time from poses.
+
+    Attributes:
+        joints: ``(n,)`` correlation of the order with each joint angle.
+        columns: ``(c,)`` with every derivative of the readings by a parameter.
+    """
+
+    joints: Array
+    columns: Array
+
+    @classmethod
+    def of(cls, q_rad: Array, rows: Array) -> Mixing:
+        """For poses ``(N, n)`` in their order and the derivatives of their readings ``(N, m, K)``."""
+        n = q_rad.shape[1]
+        found = standardised(q_rad, rows).T @ _clock(len(q_rad))
+        return cls(found[:n], found[n:])
+
+    @property
+    def worst(self) -> float:
+        """Largest of all, without its sign."""
+        return float(np.abs(np.concatenate([self.joints, self.columns])).max(initial=0.0))
+
+
+def standardised(q_rad: Array, rows: Array) -> Array:
+    """``(N, n + m K)`` joints ``(N, n)`` and derivatives ``(N, m, K)``, mean 0 and length 1; what never varies is 0."""
+    Z = np.concatenate([q_rad, rows.reshape(len(q_rad), -1)], axis=1)
+    size = np.abs(Z).max(axis=0, initial=1e-300)
+    Z = Z - Z.mean(axis=0)
+    length = np.linalg.norm(Z, axis=0)
+    varies = length > 1e-9 * size
+    return np.divide(Z, length, out=np.zeros_like(Z), where=varies)
+
+
+def mixed_order(ways: Array, Z: Array, twins: Array, rng: np.random.Generator) -> Array:
+    """``(N,)`` numbers of the stops in the order in which to drive.
+
+    Args:
+        ways: ``(N + 1, N + 1)`` length of the way between stops; the last is home, where all begins and ends.
+        Z: ``(N, c)`` what time must not go along with, ``standardised``.
+        twins: ``(t, 2)`` numbers of stops that visit the same pose.
+        rng: of the moves.
+    """
+    N = len(Z)
+    order = _nearest_neighbour(ways, N)
+    if N < 4:
+        return order
+    short = max(_length(ways, order), 1e-9)
+    clock, place = _clock(N), np.empty(N, int)
+    correlations = Z[order].T @ clock
+
+    def untold(found: Array, placed: Array) -> float:
+        excess = np.maximum(np.abs(found) - CORRELATION, 0.0)
+        gap = LEAST_GAP - np.abs(placed[twins[:, 0]] - placed[twins[:, 1]]) / N
+        return WEIGHT * float(excess @ excess) + WEIGHT * float(np.sum(np.maximum(gap, 0.0) ** 2))
+
+    place[order] = np.arange(N)
+    length, penalty = short, untold(correlations, place)
+    best, least = order.copy(), length / short + penalty
+    moves = min(MOVES_PER_STOP * N, MOST_MOVES)
+    cooling = (COLD / HOT) ** (1.0 / moves)
+    heat = HOT
+    ends, luck = np.sort(rng.integers(0, N, (moves, 2)), axis=1), rng.random(moves)
+    for (a, b), chance in zip(ends.tolist(), luck.tolist(), strict=True):
+        heat *= cooling
+        if a == b:
+            continue
+        before, after = (order[a - 1] if a else N), (order[b + 1] if b + 1 < N else N)
+        change = ways[before, order[b]] + ways[order[a], after] - ways[before, order[a]] - ways[order[b], after]
+        turned = order[a : b + 1][::-1]
+        found = correlations + Z[turned].T @ (clock[a : b + 1] - clock[a : b + 1][::-1])
+        placed = place.copy()
+        placed[turned] = np.arange(a, b + 1)
+        new = untold(found, placed)
+        worse = change / short + new - penalty
+        if worse <= 0.0 or chance < np.exp(-worse / heat):
+            order[a : b + 1] = turned
+            correlations, place, length, penalty = found, placed, length + change, new
+            if length / short + penalty < least:
+                best, least = order.copy(), length / short + penalty
+    return best
+
+
+def _clock(count: int) -> Array:
+    """``(count,)`` time of equal steps, mean 0 and length 1."""
+    steps = np.arange(count) - (count - 1) / 2.0
+    return steps / max(float(np.linalg.norm(steps)), 1e-300)
+
+
+def _length(ways: Array, order: Array) -> float:
+    home = len(ways) - 1
+    tour = np.concatenate([[home], order, [home]])
+    return float(ways[tour[:-1], tour[1:]].sum())
+
+
+def _nearest_neighbour(ways: Array, count: int) -> Array:
+    left, order, here = np.ones(count, bool), [], count
+    for _ in range(count):
+        here = int(np.argmin(np.where(left, ways[here, :count], np.inf)))
+        left[here] = False
+        order.append(here)
+    return np.array(order, int)

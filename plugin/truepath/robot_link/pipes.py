@@ -1,0 +1,43 @@
+"""The child's end of the pipes to its parent: JSON lines, safe from whatever ur_rtde prints."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+
+class Pipes:
+    """Standard input and output of a child. What a C++ library prints afterwards goes to standard error."""
+
+    def __init__(self) -> None:
+        self._answers: TextIO = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+    @contextmanager
+    def at_most(self, seconds: int) -> Iterator[None]:
+        """Ends the process if what is done here takes longer: the client may block, and hold Python's lock, for ever.
+
+        The signal is not handled by Python, which may never get to it.
+        """
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(seconds)
+        yield
+        signal.alarm(0)
+
+    def say(self, message: dict[str, Any]) -> None:
+        """Sends a message. Ends the process if the parent has gone: nobody is left to work for."""
+        try:
+            self._answers.write(json.dumps(message) + "\n")
+            self._answers.flush()
+        except (BrokenPipeError, ValueError):
+            os._exit(0)
+
+    def requests(self) -> Iterator[dict[str, Any]]:
+        """What the parent asks for, until it closes the pipe or dies."""
+        for line in sys.stdin:
+            yield json.loads(line)

@@ -1,0 +1,100 @@
+"""Campaigns with a tracker that loses the reflector at moments chosen by the test; robot and moves are real enough."""
+
+import numpy as np
+import pytest
+from truepath.recording.campaign import Campaign
+from truepath.recording.manner import Manner
+from truepath.recording.readings import BeamBroken, Reading
+from truepath.recording.row_file import RowFile
+from truepath.recording.visit import columns
+from truepath.robot_link import RobotFault, RobotLink
+
+BRISK = Manner(60.0, 200.0, settle_s=0.05, measure_s=0.05, tries=2, between_tries_s=0.05)
+
+
+class Spy:
+    """A tracker that sees what it is told to; remembers at which joints it was asked."""
+
+    gives_orientation = False
+
+    def __init__(self, link, sees):
+        self._link, self._sees, self.asked_at = link, sees, []
+
+    def reading(self, duration_s):
+        self.asked_at.append(self._link.state().q_rad)
+        spread_mm = self._sees(len(self.asked_at) - 1)
+        if spread_mm is None:
+            raise BeamBroken("something stands in the way")
+        return Reading(np.zeros(3), None, spread_mm, 10, 0.0)
+
+    def close(self):
+        pass
+
+
+@pytest.fixture(scope="module")
+def link(controller):
+    with RobotLink(controller.address, timeout_s=3.0) as link:
+        yield link
+
+
+@pytest.fixture
+def run(link, at_home, poses, tmp_path):
+    """Function: a campaign with a tracker that sees so; the outcome, the rows on the disk, the joints asked at."""
+
+    def run(sees):
+        spy = Spy(link, sees)
+        with RowFile(tmp_path / "data.csv", poses[0], "00", columns(6, False), resume=True) as rows:
+            campaign = Campaign(link, spy, poses[0], rows, 0.0, BRISK)
+            try:
+                outcome = campaign.run()
+            except RobotFault as fault:
+                outcome = fault
+        lines = (tmp_path / "data.csv").read_text().splitlines()[1:]
+        at = columns(6, False).index("visit")
+        return outcome, [int(line.split(",")[at]) for line in lines], spy.asked_at
+
+    return run
+
+
+def test_a_short_break_is_waited_for(run):
+    outcome, visits, _ = run(lambda k: None if k == 1 else 0.03)
+    assert (outcome.measured, outcome.skipped, visits) == (4, {}, [1, 3, 4, 5])
+
+
+def test_a_reflector_that_swings_is_waited_for(run):
+    _outcome, visits, asked_at = run(lambda k: 0.5 if k == 0 else 0.03)
+    assert visits == [1, 3, 4, 5]
+    assert len(asked_at) == 5
+
+
+def test_a_pose_out_of_sight_is_left_and_tried_again_at_the_end_from_its_own_side(run, poses):
+    outcome, visits, asked_at = run(lambda k: None if k in (1, 2) else 0.03)
+    assert (outcome.measured, outcome.skipped, visits) == (4, {}, [1, 4, 5, 3])
+    assert np.allclose(asked_at[-1], poses[0].q_rad[2], atol=1e-4)
+
+
+def test_a_pose_that_is_never_seen_is_told_and_the_others_stay(run):
+    outcome, visits, _ = run(lambda k: None if k in (1, 2, 5, 6) else 0.03)
+    assert visits == [1, 4, 5]
+    assert outcome.skipped == {2: "something stands in the way"}
+
+
+def test_a_tracker_that_has_lost_the_reflector_does_not_send_the_robot_round_for_nothing(run):
+    outcome, visits, _asked_at = run(lambda k: 0.03 if k == 0 else None)
+    assert isinstance(outcome, RobotFault)
+    assert "3 poses in a row" in outcome.reason
+    assert visits == [1]
+    resumed, visits, _ = run(lambda k: 0.03)
+    assert (resumed.measured, sorted(visits)) == (3, [1, 3, 4, 5])
+
+
+def test_a_robot_that_somebody_else_has_moved_is_not_driven_on_from_there(run, at_home, poses):
+    def moved_meanwhile(k):
+        if k == 1:
+            at_home.command({"do": "set", "q_rad": (poses[0].q_rad[2] + 0.2).tolist()})
+        return 0.03
+
+    outcome, visits, _ = run(moved_meanwhile)
+    assert isinstance(outcome, RobotFault)
+    assert "somebody else has moved the robot" in outcome.reason
+    assert visits == [1]

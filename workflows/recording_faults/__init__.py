@@ -1,0 +1,1 @@
+"""Parts of ``record_faults.py``."""
