@@ -123,7 +123,7 @@ def test_a_calibration_from_which_it_is_left_out_is_the_one_without(ur5):
     assert with_it.model_copy(update=moment) == without.model_copy(update=moment)
 
 
-@pytest.mark.parametrize("seed", (0, 3))  # where so small an evolution learns the groups
+@pytest.mark.parametrize("seed", [0, 3])  # where so small an evolution learns the groups
 def test_what_close_neighbours_in_time_have_in_common_is_not_taken_for_something_that_goes_with_the_pose(ur5, seed):
     """Poses measured one after the other lie close together, and the tracker moved between the groups.
 
