@@ -37,7 +37,8 @@ from truepath.virtual.real_robot import Imperfection, RealRobot
 from truepath.virtual.visits import Visits
 
 CELL = "ur5_cell"
-VISITS = 5  # of each target, so that the mean of few targets is not a matter of luck
+VISITS = 2  # of each target, so that the mean of few targets is not a matter of luck
+DEPLOY_SPEED_UP = 5.0  # at most: what is seen of a run is as coarse as the robot is faster than the packets
 MOST_TIMES_NOISE = 1.2
 
 
@@ -94,14 +95,7 @@ class Loop:
         began, options = time.monotonic(), self.options
         by = ("--calibration", "calibration.json")
         self._truepath("plan", "--robot", CELL, "--poses", options.poses, "--effects", options.hide, "-o", "poses.csv")
-        with ControllerProcess(
-            options.address,
-            robot=CELL,
-            seed=options.seed,
-            hide=self.causes,
-            noise_mm=options.noise_mm,
-            speed_up=options.speed_up,
-        ):
+        with self._controller(options.speed_up):
             self._record("poses.csv", "measured.csv")
             states = ("--measured-in", "world", "--probe", "model")
             self._truepath("diagnose", "measured.csv", "--robot", CELL, *states, "-o", ".")
@@ -109,10 +103,12 @@ class Loop:
             rewritten = rewrite_program(self.program, calibration)
             programmed, corrected = rewritten.plan.q_rad, rewritten.correction.q_rad
             self._visit(programmed, "as_programmed")
+        with self._controller(min(options.speed_up, DEPLOY_SPEED_UP)):
             self._truepath("correct", self.program, *by, "-o", "corrected.script")
             self._truepath("preview", self.program, *by, "-o", "preview.html")
             host = ("--robot-host", options.address, "--start-within-deg", 360)  # nothing stands in a virtual way
             self._truepath("deploy", "corrected.script", *by, *host, "-o", "run.csv", "--yes")
+        with self._controller(options.speed_up):
             self._visit(corrected, "as_corrected")
         wanted = self._wanted(programmed)
         predicted = calibration.model.predict(np.concatenate([programmed, corrected]))[:, :3, 3]
@@ -143,6 +139,18 @@ class Loop:
             "good": bool(ratio <= MOST_TIMES_NOISE and named == sorted(self.causes)),
         }
 
+    def _controller(self, speed_up: float) -> ControllerProcess:
+        """The same robot each time: its errors come from the seed."""
+        options = self.options
+        return ControllerProcess(
+            options.address,
+            robot=CELL,
+            seed=options.seed,
+            hide=self.causes,
+            noise_mm=options.noise_mm,
+            speed_up=speed_up,
+        )
+
     def _truepath(self, *words: object) -> None:
         """A command as one would type it, in the folder of the results."""
         command = ["truepath", *(str(word) for word in words)]
@@ -151,7 +159,7 @@ class Loop:
 
     def _record(self, poses: str, output: str) -> None:
         host = ("--robot-host", self.options.address, "--tracker", "simulated", "--robot", CELL)
-        pace = ("--speed-deg", 60, "--acceleration-deg", 120, "--settle-s", 0.1, "--measure-s", 0.1)
+        pace = ("--speed-deg", 60, "--acceleration-deg", 120, "--settle-s", 0.05, "--measure-s", 0.1)
         self._truepath("record", poses, *host, *pace, "-o", output, "--yes")
 
     def _visit(self, q_rad: Array, name: str) -> None:
