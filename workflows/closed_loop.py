@@ -31,6 +31,7 @@ from truepath.planning.pose_list import PoseList, to_csv
 from truepath.plants import models_dir
 from truepath.readers import read_measurements
 from truepath.rewriting.rewrite import rewrite_program
+from truepath.virtual.controller.addresses import checked_loopback
 from truepath.virtual.controller.process import ControllerProcess
 from truepath.virtual.hidden_causes import draw_causes, true_poses
 from truepath.virtual.real_robot import Imperfection, RealRobot
@@ -67,6 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--address", default="127.0.0.1", help="loopback address of the virtual controller")
     options = parser.parse_args(arguments)
     try:
+        checked_loopback(options.address)
         options.output.mkdir(parents=True, exist_ok=True)
         return Loop(options).run()
     except (TruepathError, OSError) as error:

@@ -17,7 +17,7 @@ def test_the_tool_of_the_model_is_no_payload(set_kg, extra_kg):
     assert extra_payload_kg(replace(STATE, payload_kg=set_kg), load_robot("ur5_cell")) == pytest.approx(extra_kg)
 
 
-def test_on_a_bare_arm_all_of_it_is():
+def test_on_abare_arm_all_of_it_is():
     assert extra_payload_kg(replace(STATE, payload_kg=1.03), load_robot("ur5")) == pytest.approx(1.03)
 
 

@@ -54,7 +54,7 @@ def calibrated_load(calibration: Calibration, controller: Controller) -> Load | 
     known, so that nobody can tell the tool from the wrist.
     """
     robot = calibration.model.robot
-    bare = _bare_arm(robot)
+    bare = bare_arm(robot)
     if bare is None:
         return None
     mass = robot.link_mass_kg[-1] - bare.link_mass_kg[-1]
@@ -69,7 +69,7 @@ def calibrated_load(calibration: Calibration, controller: Controller) -> Load | 
     return Load(float(total), centre[:3])
 
 
-def _bare_arm(robot: NominalRobot) -> NominalRobot | None:
+def bare_arm(robot: NominalRobot) -> NominalRobot | None:
     for name in BARE_ARMS:
         bare = plants.load_robot(name)
         if not what_differs(bare, robot):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from truepath.deploying.load import MASS_TOLERANCE_KG, _bare_arm
+from truepath.deploying.load import MASS_TOLERANCE_KG, bare_arm
 from truepath.robot import NominalRobot
 from truepath.robot_link import RobotFault, RobotState
 
@@ -15,7 +15,7 @@ def extra_payload_kg(state: RobotState, robot: NominalRobot) -> float:
     """
     if state.payload_kg is None:
         raise RobotFault("the controller does not tell its payload: give --payload-kg")
-    bare = _bare_arm(robot)
+    bare = bare_arm(robot)
     tool_kg = 0.0 if bare is None else float(robot.link_mass_kg[-1] - bare.link_mass_kg[-1])
     if state.payload_kg < tool_kg - MASS_TOLERANCE_KG:
         raise RobotFault(
