@@ -103,3 +103,24 @@ def test_without_a_gap_no_target_is_left_out():
     corners = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)]
     found = passed(along(*corners), goals((0.3, 0.0), (9.0, 9.0), (0.3, 0.3), (0.0, 0.3)))
     assert found.count == 1
+
+
+def test_after_a_gap_the_place_where_the_robot_stands_is_no_later_target_for_which_there_was_no_time():
+    home, away = (0.0, 0.0), [(0.5, 0.3), (0.8, 0.6), (1.1, 0.9)]
+    path = along(home, home, (0.2, 0.12), dwell=60)
+    time_s = 0.008 * np.arange(len(path))
+    time_s[30:] += 0.15
+    passages = Passages(goals(home, *away, home), np.zeros(5))
+    passages.take(time_s, path)
+    passages.take(time_s[-1:], path[-1:], ended=True)
+    assert passages.count == 1
+
+
+def test_what_was_nearest_while_nothing_was_seen_is_not_told_as_reached():
+    path = along((0.0, 0.0), (0.3, 0.0), (0.3, 0.3))
+    time_s = 0.008 * np.arange(len(path)) + np.where(path[:, 1] > 0, 0.2, 0.0)
+    seen = np.abs(path[:, :2] - (0.3, 0.0)).max(axis=1) > 0.012
+    passages = Passages(goals((0.3, 0.0), (0.3, 0.3)), np.zeros(2))
+    passages.take(time_s[seen], path[seen], ended=True)
+    assert passages.count == 2
+    assert np.isnan(passages.time_s).tolist() == [True, False]

@@ -10,7 +10,7 @@ import numpy as np
 from truepath.calibration import Calibration
 from truepath.controller import Controller
 from truepath.deploying.follow import Followed
-from truepath.deploying.passages import Passages
+from truepath.deploying.passages import ZONE_RAD, Passages
 from truepath.deploying.rehearsal import Rehearsal
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
@@ -28,6 +28,7 @@ class Outcome:
         joint_off_rad: ``(N,)`` largest difference of one joint.
         tool_off_mm: ``(N,)`` distance of the tool from where the commanded joints put it, both by the calibration.
         time_s: ``(N,)`` of the controller's clock.
+        count: targets that were passed, seen or not.
     """
 
     rehearsal: Rehearsal
@@ -36,6 +37,7 @@ class Outcome:
     joint_off_rad: Array
     tool_off_mm: Array
     time_s: Array
+    count: int
 
     @property
     def passed(self) -> int:
@@ -48,14 +50,21 @@ class Outcome:
 
     @property
     def unseen(self) -> int:
-        """How many targets lie before one that was passed, and were passed while nothing was seen of the robot."""
-        known = np.flatnonzero(~np.isnan(self.time_s))
-        return int(known[-1] + 1 - len(known)) if len(known) else 0
+        """How many targets were passed while nothing was seen of the robot."""
+        return self.count - self.passed
 
     @property
     def as_planned(self) -> bool:
-        """It ran to its end, past all targets."""
-        return self.followed.completed and self.passed + self.unseen == len(self.rehearsal)
+        """It ran to its end, past all targets, and stands at the last one."""
+        return self.followed.completed and self.passed + self.unseen == len(self.rehearsal) and self._stands_at_end
+
+    @property
+    def _stands_at_end(self) -> bool:
+        """Where targets may have been passed unseen, standing there is what tells the end from a stop before it."""
+        last = self.followed.last
+        if not self.unseen or self.rehearsal.open_end or last is None:
+            return True
+        return bool(np.abs(last.q_rad - self.rehearsal.q_rad[-1]).max() <= ZONE_RAD)
 
     @property
     def ended(self) -> str:
@@ -109,7 +118,7 @@ def outcome_of(
         places = [(calibration.model.flange_poses(q[known]) @ X_FT)[:, :3, 3] for q in (commanded, reached)]
         tool_off[known] = 1e3 * np.linalg.norm(places[1] - places[0], axis=1)
     joint_off = np.abs(reached - commanded).max(axis=1, initial=0.0)
-    return Outcome(rehearsal, followed, reached, joint_off, tool_off, passages.time_s)
+    return Outcome(rehearsal, followed, reached, joint_off, tool_off, passages.time_s, passages.count)
 
 
 def _statistics(values: Array) -> dict[str, float] | None:

@@ -12,14 +12,16 @@ STEPS_AROUND = 0.75  # of the way between two samples: how far from both a targe
 PASSED_RAD = 5e-4  # by so much further away than it was: it is behind
 GAP_S, GAP_STEPS = 0.1, 5  # nothing was seen for so long, and for so many times as usual
 LOOK_AHEAD = 200  # targets that may have been passed unseen
+FASTEST_RAD_S = np.pi  # of a joint: sooner, nobody can have passed what lies between
 
 
 class Passages:
     """Closest approaches to targets in their order, as samples come in.
 
     Between two samples the joints are taken to go straight, but not where nothing was seen for a while: then targets
-    may have been passed unseen, and the next one that is seen counts. A target counts as passed when the robot has
-    been near it and goes away again, or when the motion has ended there.
+    may have been passed unseen. That is judged when the motion has ended: the next target counts to which the robot
+    has come later, if there was time enough for those between. A target counts as passed when the robot has been near
+    it and goes away again, or when the motion has ended there.
 
     Args:
         q_rad: ``(N, 6)`` joints of the targets.
@@ -39,6 +41,7 @@ class Passages:
         self.count = 0
         self._path = np.empty((0, 7))  # time and joints since the last target that was passed
         self._usual_s = np.inf  # between two samples
+        self._since_s = np.inf  # when that was
         self._unseen = False  # whether there has been a gap since then
 
     def take(self, time_s: Array, q_rad: Array, ended: bool = False) -> None:
@@ -52,12 +55,13 @@ class Passages:
         self._path = np.vstack([self._path, np.column_stack([time_s, q_rad])])
         if len(self._path) == 1:
             self._path = np.repeat(self._path, 2, axis=0)
+        self._since_s = min(self._since_s, float(self._path[0, 0]))
         if len(time_s) > 1:
             self._usual_s = min(self._usual_s, float(np.median(np.diff(time_s))))
         self._unseen |= bool(self._gaps().any())
         while self.count < len(self._goals) and len(self._path) >= 2:
             if not (self._passes(self.count, ended) or self._passes_later_one(ended)):
-                if not self._near(self.count)[0].any():
+                if not self._unseen and not self._near(self.count)[0].any():
                     self._path = self._path[-1:]
                 return
 
@@ -89,15 +93,24 @@ class Passages:
         if not (receding.any() or ended):
             return False
         best = first + int(np.argmin(visit[: int(np.argmax(receding)) if receding.any() else len(visit)]))
+        if self._path[best + 1, 0] - self._since_s < self._least_time_s(target):
+            return False
         closest = self._path[best] + share[best] * (self._path[best + 1] - self._path[best])
-        self.time_s[target], self.reached_rad[target] = closest[0], closest[1:]
-        self.count = target + 1
+        at_a_gap = bool(self._gaps()[max(best - 1, 0) : best + 2].any())
+        if not (at_a_gap and away[best] > PASSED_RAD):  # else it was nearer while nothing was seen
+            self.time_s[target], self.reached_rad[target] = closest[0], closest[1:]
+        self.count, self._since_s = target + 1, float(closest[0])
         self._path = np.vstack([closest, self._path[best + 1 :]])
         self._unseen = bool(self._gaps().any())
         return True
 
+    def _least_time_s(self, target: int) -> float:
+        """That the way over all targets from the one passed last takes."""
+        legs = np.diff(self._goals[max(self.count - 1, 0) : target + 1], axis=0)
+        return float(np.abs(legs).max(axis=1, initial=0.0).sum()) / FASTEST_RAD_S if target > self.count else 0.0
+
     def _passes_later_one(self, ended: bool) -> bool:
-        if not self._unseen or self._near(self.count)[0].any():
+        if not (ended and self._unseen) or self._near(self.count)[0].any():
             return False
         later = range(self.count + 1, min(self.count + LOOK_AHEAD, len(self._goals)))
         return any(self._passes(target, ended) for target in later)
