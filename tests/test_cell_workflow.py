@@ -68,8 +68,14 @@ def test_it_prints_its_address_first_and_what_it_found(running):
     assert running.lines[0].startswith("open http://localhost:")
     assert "for this machine only" in running.lines[0]
     assert any(line.startswith("warning: line 3 stays as it is") for line in running.lines)
-    numbers = re.search(r"real tool ([\d.]+) mm mean.*corrected ([\d.]+) mm mean", "\n".join(running.lines))
-    assert float(numbers[2]) < 0.02 < 0.5 < float(numbers[1])
+    numbers = re.search(
+        r"predicted error of the tool ([\d.]+) mm mean.*corrected (.*) mm mean", "\n".join(running.lines)
+    )
+    assert float(numbers[1]) > 0.5
+    assert numbers[2] == "< 0.001"
+    assert "looked for collisions in the host's plant" in running.lines
+    known = re.search(r"the calibration was off by ([\d.]+) mm mean", "\n".join(running.lines))
+    assert 0.005 < float(known[1]) < 0.1
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="only Linux tells who listens where")

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 from truepath.clearance import Clearances
-from truepath.closer import Closer, clearance_findings, compare
+from truepath.closer import (
+    Closer,
+    Driven,
+    clearance_findings,
+    collide_all_along,
+    compare,
+    driven_findings,
+)
 
 ARM_TABLE, TOOL_TABLE = ("arm", "table"), ("table", "tool")
 INF = np.inf
@@ -95,3 +102,38 @@ def test_findings_carry_line_and_figures():
     assert closer.message == "table and tool: 6.00 mm apart after the correction, 9.00 mm apart before"
     assert (as_meant.level, as_meant.guard, as_meant.line) == ("warning", "collision", 17)
     assert as_meant.message.endswith("1.00 mm apart before; so does the program in the cell as drawn")
+
+
+def test_what_collides_before_and_after_is_told_with_its_deepest_place_in_each_line():
+    before = clearances(tool=[-3.0, -9.0, -4.0, 1.0, -2.0, -0.05], arm=[INF, -1.0, 5.0, 5.0, 5.0, 5.0])
+    after = clearances(tool=[-3.1, -9.2, -4.1, -0.4, -2.1, -0.05], arm=[INF, -1.1, -0.2, 5.0, 5.0, 5.0])
+    line = np.array([3, 3, 3, 4, 5, 6])
+    driven = collide_all_along(before, after, line)
+    assert driven == [
+        Driven(1, TOOL_TABLE, pytest.approx(0.0092)),
+        Driven(1, ARM_TABLE, pytest.approx(0.0011)),
+        Driven(4, TOOL_TABLE, pytest.approx(0.0021)),
+    ]
+    first, *_ = findings = driven_findings(driven, line)
+    assert first.message == (
+        "the program itself drives table and tool 9.20 mm into each other; the correction does not change that"
+    )
+    assert (first.value, first.limit, first.unit) == (pytest.approx(-9.2), 0.0, "mm")
+    assert [(each.level, each.guard, each.line) for each in findings] == [
+        ("warning", "collision", 3),
+        ("warning", "collision", 3),
+        ("warning", "collision", 5),
+    ]
+
+
+def test_where_a_path_enters_the_deepest_place_is_told_with_the_first_touch():
+    before, after = clearances(tool=[0.3, -20.0, -35.0]), clearances(tool=[-0.4, -20.5, -35.5])
+    line = np.arange(3) + 1
+    driven = collide_all_along(before, after, line)
+    (touch,) = clearance_findings(compare(before, after), line, driven=driven)
+    assert touch.level == "error"
+    assert touch.message.endswith(
+        "0.30 mm apart before; 35.50 mm deep at most, where the correction does not change that"
+    )
+    (elsewhere,) = clearance_findings(compare(before, after), line, driven=[Driven(2, ARM_TABLE, 0.1)])
+    assert elsewhere.message.endswith("0.30 mm apart before")

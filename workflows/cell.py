@@ -63,20 +63,25 @@ def operate(options: argparse.Namespace) -> None:
     if options.save_calibration is not None:
         plugin.save(options.save_calibration)
 
-    from truepath.rewriting.options import RewriteOptions
+    from truepath.preview.figures import in_mm
 
     controls = plugin.operate(
         options.program,
         magnification=options.magnification,
         drawn_below=PREFIX,
-        options=RewriteOptions(cell=CELL),
+        context=host.context,
         say=lambda text: print(text, flush=True),
     )
     course = controls.view.course
     for each in course.remarks:
         print(f"warning: {each.text}")
-    before, after = (f"{errors.mean:.3f} mm mean, {errors.max:.3f} mm max" for errors in course.at_waypoints())
-    print(f"{Path(options.program).name}: real tool {before}; corrected {after}")
+    print(f"looked for collisions in {course.shown.looked_in or 'no cell'}")
+    before, after = (f"{in_mm(e.mean)} mm mean, {in_mm(e.max)} mm max" for e in course.at_waypoints())
+    print(f"{Path(options.program).name}: predicted error of the tool {before}; corrected {after}")
+    heldout = plugin.calibration.heldout
+    if heldout is not None:
+        known = heldout.calibrated.position_mm
+        print(f"the calibration was off by {known.mean:.3f} mm mean, {known.max:.3f} mm max on poses it had not seen")
     print("ready: keys and buttons (Open Controls, top right) work in the browser", flush=True)
     meshcat.Flush()
     controls.run(0.0 if options.once else options.seconds)

@@ -1,7 +1,8 @@
-"""Where a correction takes two bodies of a cell closer to each other: clearances before and after, compared."""
+"""Clearances before and after a correction, compared: where bodies come closer, and where they collide all along."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -77,20 +78,85 @@ def compare(
     return sorted(found, key=lambda place: (place.index, place.after_m))
 
 
-def clearance_findings(places: list[Closer], line: Array, near_m: float = NEAR_M) -> list[Finding]:
+@dataclass(frozen=True)
+class Driven:
+    """Two bodies that collide with or without a correction: the program itself drives one into the other.
+
+    Attributes:
+        index: of the waypoint where they are deepest in each other, of those of one line.
+        bodies: their names.
+        depth_m: how deep after the correction, more than 0.
+    """
+
+    index: int
+    bodies: tuple[str, str]
+    depth_m: float
+
+
+def collide_all_along(before: Clearances, after: Clearances, line: Array) -> list[Driven]:
+    """Where bodies are in each other before and after, which ``compare`` leaves alone: no correction changes that.
+
+    Args:
+        before, after: along the same N waypoints.
+        line: ``(N,)`` line of each waypoint.
+
+    Returns:
+        For each pair of bodies and each line the deepest waypoint; ordered by waypoint.
+    """
+    found = []
+    for bodies in after.bodies:
+        now = after.of(bodies)
+        within = np.flatnonzero((now < -TOUCHING_M) & (before.of(bodies) < -TOUCHING_M))
+        deepest_last = within[np.argsort(-now[within], kind="stable")]
+        of_each_line = {int(line[k]): int(k) for k in deepest_last}
+        found += [Driven(k, bodies, -float(now[k])) for k in of_each_line.values()]
+    return sorted(found, key=lambda place: (place.index, -place.depth_m))
+
+
+def driven_findings(places: list[Driven], line: Array) -> list[Finding]:
+    """A warning for each of them.
+
+    Args:
+        places: from ``collide_all_along``.
+        line: ``(N,)`` line of each waypoint.
+    """
+    return [
+        Finding(
+            "warning",
+            "collision",
+            int(line[place.index]),
+            f"the program itself drives {place.bodies[0]} and {place.bodies[1]} {1e3 * place.depth_m:.2f} mm into each "
+            "other; the correction does not change that",
+            -1e3 * place.depth_m,
+            0.0,
+            "mm",
+        )
+        for place in places
+    ]
+
+
+def clearance_findings(
+    places: list[Closer], line: Array, near_m: float = NEAR_M, driven: Sequence[Driven] = ()
+) -> list[Finding]:
     """An error for each new collision, a warning for what comes closer.
 
     Args:
         places: from ``compare``.
         line: ``(N,)`` line of each waypoint.
+        driven: from ``collide_all_along``: a path that enters a body by itself is deeper in it further on than where
+            the correction lets it touch first, which is then told too.
     """
     findings = []
+    deepest = {place.bodies: place for place in sorted(driven, key=lambda place: place.depth_m)}
     for place in places:
         is_new = place.kind == "new"
         what = f"{place.bodies[0]} and {place.bodies[1]}: {_in_words(place.after_m)} after the correction"
         message = f"{what}, {_in_words(place.before_m)} before"
         if place.kind == "meant":
             message += "; so does the program in the cell as drawn"
+        further = deepest.get(place.bodies)
+        if place.kind != "closer" and further is not None and further.depth_m > -place.after_m:
+            message += f"; {1e3 * further.depth_m:.2f} mm deep at most, where the correction does not change that"
         findings.append(
             Finding(
                 "error" if is_new else "warning",

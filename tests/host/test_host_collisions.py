@@ -19,18 +19,18 @@ class Host:
     """The foreign host with shapes: a ball at the tip of the right tool, a block in the left one's, and a floor.
 
     With the left arm at ``LEFT`` the block stands where the program takes the ball 0.3 mm into it. Today the real
-    tool misses its way, and the block.
+    tool misses its way, and the block; unless it is meant to go deeper.
     """
 
-    def __init__(self, drawn, real):
+    def __init__(self, drawn, real, deep_m=DEEP_M):
         q = path(10)[TOUCHING]
         self.meant, self.today = drawn.poses(q)[0, :3, 3], real.poses(q)[0, :3, 3]
         away = (self.today - self.meant) / np.linalg.norm(self.today - self.meant)
-        middle = self.meant - away * (RADIUS_M - DEEP_M + EDGE_M / 2)
+        middle = self.meant - away * (RADIUS_M - deep_m + EDGE_M / 2)
         X_WK = RigidTransform(RotationMatrix.MakeFromOneVector(away, 2), middle)
         bare = build_plant()
         X_KL = X_WK.inverse() @ self._left(bare, bare.CreateDefaultContext())
-        self.before_mm = 1e3 * (np.linalg.norm(self.today - self.meant) - DEEP_M)
+        self.before_mm = 1e3 * (np.linalg.norm(self.today - self.meant) - deep_m)
         builder = DiagramBuilder()
         self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
         build_plant(self.plant, lambda plant: self._furnish(plant, X_KL.inverse()))
@@ -172,3 +172,60 @@ def test_the_real_cell_confirms_it(host, plugin, program, rigid_cell):
     depth = (rigid_cell.poses(q)[0, :3, 3] - host.meant) @ away - DEEP_M
     assert depth == pytest.approx(-DEEP_M, abs=5e-5)
     assert isinstance(rigid_cell, RealCell)
+
+
+def test_a_program_that_collides_by_itself_is_told_how_deep(drawn, rigid_cell, rigid, program):
+    """The ball is meant to be 8 mm in the block, and is in it today: the correction brings nothing new."""
+    host = Host(drawn, rigid_cell, deep_m=0.008)
+    assert host.before_mm < -1.0
+    plugin = plugin_for(host.plant, scene_graph=host.scene_graph)
+    plugin.use(rigid.calibration)
+    rewritten = plugin.correct(program, context=host.context)
+    (finding,) = [each for each in about_the_block(rewritten.findings) if each.line == TOUCHING + 2]
+    assert (finding.level, finding.guard) == ("warning", "collision")
+    assert finding.value == pytest.approx(-8.0, abs=0.06)
+    assert finding.message.startswith("the program itself drives left_tool::gripper and right_tool::gripper ")
+    assert any("in line 7: the program itself" in warning for warning in rewritten.warnings)
+    told = f"<RewrittenProgram {program}: 10 of 10 targets corrected, {len(rewritten.warnings)} warnings, looked for"
+    assert repr(rewritten) == f"{told} collisions in the host's plant>"
+
+
+# Whatever is shown is judged like what is corrected
+
+
+@pytest.fixture
+def showing(host, rigid, meshcat):
+    plugin = plugin_for(host.plant, scene_graph=host.scene_graph, meshcat=meshcat)
+    plugin.use(rigid.calibration)
+    yield plugin
+    plugin.remove()
+
+
+def test_what_is_shown_is_judged_in_the_context_that_was_stated(host, showing, program):
+    shown = showing.preview(program, context=host.root)
+    assert any("left_tool::gripper" in warning for warning in shown.warnings)
+    assert shown.looked_in == "the host's plant"
+    assert showing.preview(program, context=host.context, collisions=False).warnings == ()
+    assert showing.preview(program).warnings == ()
+
+
+def test_of_a_trajectory_they_are_stepped_to_at_their_time(host, showing):
+    q = path(10)[TOUCHING:]
+    trajectory = PiecewisePolynomial.CubicShapePreserving(np.linspace(0.0, 4.0, len(q)), q.T, True)
+    remarks = showing.operate(trajectory, context=host.context).view.course.remarks
+    (first, *_) = [each for each in remarks if "left_tool::gripper" in each.text]
+    assert "at 0.000 s" in first.text
+    assert first.waypoint == 0
+
+
+def test_on_a_page_they_are_told_too(host, showing, program, tmp_path):
+    page = tmp_path / "page.html"
+    showing.preview(program, context=host.context, output=page, robot_source="ur5")
+    assert "left_tool::gripper" in page.read_text(encoding="utf-8")
+
+
+def test_none_is_nowhere_as_on_the_command_line(host, showing, program):
+    nowhere = RewriteOptions(cell="none")
+    rewritten = showing.correct(program, options=nowhere, context=host.context)
+    assert (rewritten.cell, rewritten.findings) == (None, ())
+    assert showing.preview(program, options=nowhere).looked_in is None

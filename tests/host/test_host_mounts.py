@@ -14,6 +14,7 @@ from truepath import plants
 from truepath.errors import InputError
 from truepath.host import CalibrationPlugin
 from truepath.host.host_cell import HostCell
+from truepath.host.placed_robot import PlacedRobot
 
 X_FG, X_GT = RigidTransform(RollPitchYaw(0.1, -0.2, 0.7), [0.01, -0.02, 0.03]), RigidTransform([0.05, 0.02, 0.14])
 FLANGE = re.compile(r'\s*<link name="flange"/>\s*<joint name="flange_joint".*?</joint>', re.DOTALL)
@@ -149,7 +150,7 @@ def test_where_collisions_are_looked_for_the_body_of_the_tool_is_where_it_really
     real, q, points = measured(True, "tcp")
     plugin = CalibrationPlugin(plant, model_instance="ur5", tool_frame="tcp", scene_graph=scene_graph)
     calibration = plugin.calibrate(plugin.measurements(q, points), effects="none")
-    posed = HostCell(plugin.place, calibration.region.region(), scene_graph).with_robot(calibration.model)
+    posed = HostCell(PlacedRobot.of(plugin), scene_graph).with_robot(calibration.model)
     for joints, point in zip(some_joints(4, 3), real.tool(some_joints(4, 3)), strict=True):
         plant.SetPositions(posed.context, joints)
         X_WP = plant.GetFrameByName("pen").CalcPoseInWorld(posed.context)

@@ -136,6 +136,16 @@ def test_a_source_without_this_arm_is_refused(prefixed):
         CalibrationPlugin(prefixed.plant, robot_source="elsewhere.urdf")
 
 
+def test_a_source_of_another_geometry_is_refused_with_its_numbers(rigid):
+    with pytest.raises(InputError, match="another robot") as caught:
+        CalibrationPlugin(rigid.plant, model_instance="left::ur5", robot_source="ur10")
+    assert "612.7 mm instead of 425 mm" in caught.value.found or "612 mm instead of 425 mm" in caught.value.found
+    at_the_link = CalibrationPlugin(
+        rigid.plant, model_instance="left::ur5", flange_frame="wrist_3_link", robot_source="ur5"
+    )
+    assert at_the_link.source == "ur5"
+
+
 def test_the_source_can_be_named_later(prefixed, saved, tmp_path):
     (tmp_path / "left.urdf").write_text(prefixed_text())
     prefixed.load(saved)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from foreign_host import path
-from live_host import BELOW
+from foreign_host import path, plugin_for
+from live_host import BELOW, start_meshcat
 from truepath.host.controls import COLOUR, MAGNIFY, NEXT, PATH, PLAY, PREVIOUS, SHOW
 
 
@@ -113,3 +113,46 @@ def test_a_second_program_takes_the_place_of_the_first(operate, browser, drawn):
     browser.drag(PATH, 100.0)
     controls.poll()
     assert np.linalg.norm(browser.tool_of("arm_corrected") - drawn.poses(q[-1])[0, :3, 3]) < 5e-3
+
+
+# Beside the host's own controls
+
+
+@pytest.fixture
+def of_the_host(meshcat):
+    """A slider and a button of the host that have the names of ours."""
+    meshcat.AddSlider(PATH, 0.0, 100.0, 1.0, 42.0)
+    meshcat.AddButton(PLAY)
+    yield
+    meshcat.DeleteSlider(PATH, strict=False)
+    meshcat.DeleteButton(PLAY, strict=False)
+
+
+def test_controls_of_the_host_with_the_same_names_stay_its_own(of_the_host, operate, browser, host, meshcat):
+    controls = operate(path(12))
+    browser.drag(PATH, 77.0)
+    browser.click(PLAY)
+    controls.poll()
+    assert controls.view.place == 0.0
+    assert not controls.playing
+    browser.drag(f"{PATH} · right::ur5", 60.0)
+    controls.poll()
+    assert controls.view.place == pytest.approx(0.6)
+    host.plugin.remove()
+    assert meshcat.GetSliderNames() == [PATH]
+    assert meshcat.GetSliderValue(PATH) == 77.0
+    assert meshcat.GetButtonClicks(PLAY) == 1
+
+
+def test_when_the_host_deletes_all_controls_they_end_quietly(rigid, plant):
+    own = start_meshcat()
+    plugin = plugin_for(plant, meshcat=own)
+    plugin.use(rigid.calibration)
+    controls = plugin.operate(path(3))
+    own.DeleteAddedControls()
+    assert controls.is_removed
+    controls.poll()
+    controls.run()
+    own.AddButton(PLAY)  # the host's now
+    plugin.remove()
+    assert own.GetButtonNames() == [PLAY]

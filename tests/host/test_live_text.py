@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from foreign_host import path
+from live_host import BELOW
+from truepath.calibration_parts import StatisticsPart
+from truepath.host.asked import Asked
 from truepath.host.captions import LEGEND_PX, PLACE_PX, STILL_PX, draw_legend, draw_place
 from truepath.host.controls import PATH, Controls
-from truepath.host.course import Course, shown_path
+from truepath.host.course import Course
 from truepath.host.live_view import PARTS
 from truepath.host.on_screen import SCREEN_PX, Pane
 from truepath.host.placed_robot import PlacedRobot
+from truepath.preview.colours import BAND_OPACITY, PROGRAMMED, on_white
 from truepath.preview.shown import Remark
 
 CONTROLS_PX = 245  # of Meshcat, once they are opened, at the right
@@ -23,7 +27,7 @@ def course(rigid):
     q = path(12)
     q[8:, 5] += 3.0
     shown = replace(
-        shown_path(rigid, q),
+        Asked(q).shown(rigid),
         line=np.arange(12) + 12345,
         labels=("movel(pose_trans(p[0.1, 0.2, 0.3, 0, 0, 0], offset), a=1.2, v=0.25)",) * 12,
         remarks=(Remark("joint-speed, line 12345: " + "the wrist would have to turn faster than it can " * 4, 3),),
@@ -44,6 +48,7 @@ def figures(course):
                 1234.5,
                 25.0,
                 dict.fromkeys(PARTS, True),
+                StatisticsPart(mean=0.1234, rms=0.2, p95=0.3, max=0.4567),
             ),
         ),
         (LEGEND_PX, lambda f: draw_legend(f, course, "p on ur5", 1.0, None, dict.fromkeys(PARTS, False))),
@@ -85,8 +90,28 @@ def test_the_legend_states_magnification_errors_and_the_end_of_the_colour_bar(co
     real, corrected = course.at_waypoints()
     for part in ("errors drawn 1234 times as long", "25 mm", "programmed", "joints not measured", "orange ghost"):
         assert part in said
-    assert f"real tool today: mean {real.mean:.3f}, max {real.max:.3f} mm" in said
-    assert f"corrected: mean {corrected.mean:.3f}, max {corrected.max:.3f} mm" in said
+    assert f"real tool today: predicted mean {real.mean:.3f}, max {real.max:.3f} mm" in said
+    assert 0 < corrected.max < 0.0005
+    assert "corrected: predicted mean < 0.001, max < 0.001 mm" in said
+    assert "was off by 0.123 mm (mean), 0.457 mm (max) on measured poses that it had not seen" in said
+
+
+def test_the_place_never_promises_nothing_at_all(course):
+    said = " ".join(text.get_text() for text in figures(course)[4].texts)  # at the first waypoint
+    assert "< 0.001 mm corrected (predicted)" in said
+
+
+def test_the_programmed_path_has_the_colour_that_the_legend_and_the_page_give_it(operate, browser):
+    operate(path(3))
+    assert browser.property(f"{BELOW}/programmed", "opacity") == BAND_OPACITY
+    assert on_white("#000000", 0.5) == "#808080"
+    assert on_white("#ff0000", 0.25) == "#ffbfbf"
+    figure = Pane(None, "pane", *LEGEND_PX, "top").figure()
+    course = operate(path(3)).view.course
+    draw_legend(figure, course, "p", 1.0, 1.0, dict.fromkeys(PARTS, True))
+    swatch = figure.axes[0].images[0]
+    shade = swatch.cmap(0.5)[:3]
+    assert "#" + "".join(f"{round(255 * channel):02x}" for channel in shade) == on_white(PROGRAMMED, BAND_OPACITY)
 
 
 def test_keys_are_told_to_whom_has_them(course):

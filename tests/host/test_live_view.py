@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from foreign_host import path
 from live_host import BELOW, GRIPPER
+from truepath.host.asked import Asked
 from truepath.host.controls import COLOUR, MAGNIFY, NEXT, PATH, PLAY, SHOW
 from truepath.host.placed_robot import PlacedRobot
 
@@ -83,9 +84,9 @@ def test_a_single_waypoint_stands_still(operate, browser, drawn):
 
 
 def test_long_paths_are_thinned_out_and_stay_where_they_are(host, rigid):
-    from truepath.host.course import Course, shown_path
+    from truepath.host.course import Course
 
-    course = Course.of(PlacedRobot.of(rigid), shown_path(rigid, path(10_000)))
+    course = Course.of(PlacedRobot.of(rigid), Asked(path(10_000)).shown(rigid))
     assert len(course.meant) >= 10_000
     assert len(course.kept) <= 2_010
     within = np.arange(len(course.meant))
@@ -97,10 +98,8 @@ def test_long_paths_are_thinned_out_and_stay_where_they_are(host, rigid):
 
 
 def test_moves_that_stay_as_they_are_are_among_the_warnings(rigid, tmp_path):
-    from truepath.host.course import shown_path
-
     script = tmp_path / "p.script"
     first, last = (", ".join(f"{angle:.6f}" for angle in q) for q in path(12)[[0, -1]])
     script.write_text(f"def p():\n  movej([{first}])\n  movel(get_target_from_plc())\n  movej([{last}])\nend\n")
-    texts = [remark.text for remark in shown_path(rigid, script).remarks]
+    texts = [remark.text for remark in Asked(script).shown(rigid).remarks]
     assert sum(text.startswith("line 3 stays as it is: ") for text in texts) == 1

@@ -82,19 +82,29 @@ class ArmInPlant:
         Raises:
             InputError: a context of something else.
         """
+        from pydrake.systems.framework import Context
+
+        if not isinstance(context, Context):  # of None Drake would make an end of the whole process
+            raise _foreign(type(context).__name__)
         try:
             self.plant.ValidateContext(context)
             return context
-        except (RuntimeError, TypeError):
+        except RuntimeError:
             pass
         try:
-            return self.plant.GetMyMutableContextFromRoot(context)
-        except (RuntimeError, TypeError) as error:
-            raise InputError(
-                "this context does not belong to the plant",
-                expected="the context of the plugin's plant, or of the diagram that holds it",
-                found=str(error).splitlines()[0],
-            ) from None
+            own = self.plant.GetMyMutableContextFromRoot(context)
+            self.plant.ValidateContext(own)  # a plant without a diagram takes any
+            return own
+        except RuntimeError as error:
+            raise _foreign(str(error).splitlines()[0]) from None
+
+
+def _foreign(found: str) -> InputError:
+    return InputError(
+        "this context does not belong to the plant",
+        expected="the context of the plugin's plant, or of the diagram that holds it",
+        found=found,
+    )
 
 
 def is_carried_by(plant: MultibodyPlant, frame: Frame, arm: Arm) -> bool:

@@ -14,8 +14,8 @@ from truepath.host.arm_in_plant import ArmInPlant
 from truepath.host.in_memory import MeasuredIn, Probe, as_measurements, stated_base, stated_probe
 from truepath.lie import Array
 from truepath.measurements import Measurements
-from truepath.plants import BUILT_IN, HOSTS_PLANT
-from truepath.robot import NominalRobot
+from truepath.plants import BUILT_IN, HOSTS_PLANT, load_plant
+from truepath.robot import NominalRobot, read_robot
 from truepath.same_robot import require_same_robot
 
 if TYPE_CHECKING:
@@ -67,15 +67,28 @@ class Calibrating:
         """Says which file holds the arm: a built-in name, a URDF or directives. Calibrations saved from now on name it.
 
         Raises:
-            InputError: no such file, or none with these joints in it.
+            InputError: no such file, none with these joints in it, or an arm of another geometry.
         """
         from truepath.model_files import find_urdf
 
-        find_urdf(robot_source, self.robot.joint_names, self.robot.name)
+        urdf = find_urdf(robot_source, self.robot.joint_names, self.robot.name)
+        self._require_geometry(urdf)
         is_built_in = str(robot_source) in BUILT_IN
         self.source = str(robot_source) if is_built_in else str(Path(robot_source).resolve())
         if self._calibration is not None:
             self.use(self._calibration)
+
+    def _require_geometry(self, urdf: Path) -> None:
+        """Refuses a file whose arm is another one; its end does not count if it has no frame of that name."""
+        plant, arm = load_plant(urdf), self.place.arm
+        joints = [plant.GetJointByName(name) for name in self.robot.joint_names]
+        has_flange = plant.HasFrameNamed(arm.flange.name())
+        end = arm.flange.name() if has_flange else joints[-1].child_body().name()
+        base = arm.base.name() if plant.HasFrameNamed(arm.base.name()) else None
+        given = read_robot(plant, base_frame=base, flange_frame=end)
+        if not has_flange:
+            given = replace(given, X_BF=self.robot.X_BF)
+        require_same_robot(self.robot, given, "the source holds another robot than this arm", urdf)
 
     @property
     def arm(self) -> Array:

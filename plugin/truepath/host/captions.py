@@ -9,22 +9,27 @@ import numpy as np
 
 from truepath.host.course import Course
 from truepath.preview.colours import (
+    BAND_OPACITY,
     CORRECTED,
     ERROR_SCALE,
     OUTSIDE,
     PROGRAMMED,
     UNCORRECTED,
+    on_white,
 )
+from truepath.preview.figures import in_mm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from truepath.calibration_parts import StatisticsPart
 
 INK, PALE, WARNING = "#1c1c1c", "#464646", "#8a4b00"
 TEXT, SMALL = 9.6, 9.0  # points, of 1/72 inch at 100 pixels an inch: 13.3 and 12.5 pixels
 LEFT_PX, ROW_PX = 12, 20
 SWATCH_PX = 26
 WIDTH_PX = 740  # seen whole where the screen is no wider than high, and beside Meshcat's own controls on wider ones
-LEGEND_PX = (WIDTH_PX, 4 * ROW_PX + 10)
+LEGEND_PX = (WIDTH_PX, 5 * ROW_PX + 10)
 PLACE_PX, STILL_PX = (WIDTH_PX, 3 * ROW_PX + 10), (WIDTH_PX, 2 * ROW_PX + 10)  # with controls and without
 LONGEST, LONGEST_BOLD = 98, 88  # letters that fit
 KEYS = "Keys: space play/stop · ← → move · N, B warnings · C colour by error · 1 to 8 show/hide parts"
@@ -38,31 +43,41 @@ PARTS = {
 
 
 def draw_legend(
-    figure: Figure, course: Course, title: str, magnification: float, by_error: float | None, visible: dict[str, bool]
+    figure: Figure,
+    course: Course,
+    title: str,
+    magnification: float,
+    by_error: float | None,
+    visible: dict[str, bool],
+    model_error: StatisticsPart | None = None,
 ) -> None:
-    """The title, how errors are drawn, and what the lines are.
+    """The title, how errors are drawn, what the lines are, and what all of it is worth.
 
     Args:
         by_error: end of the colour scale, mm; None: lines have one colour each.
         visible: the parts of the view, and which of them are shown.
+        model_error: of the calibrated model on poses that it had not seen, mm; None: unknown.
     """
     page = _Rows(figure, LEGEND_PX)
     page.text(0, 0, shorten(title, 44, placeholder=" …"), bold=True)
     times = f"errors drawn {magnification:.4g} times as long" if magnification != 1 else "errors in true size"
     page.text(0, LEGEND_PX[0] - 2 * LEFT_PX, times, right=True, bold=True)
-    real, corrected = (f"mean {e.mean:.3f}, max {e.max:.3f} mm" for e in course.at_waypoints())
-    page.swatch(1, 0, PROGRAMMED)
+    real, corrected = (f"predicted mean {in_mm(e.mean)}, max {in_mm(e.max)} mm" for e in course.at_waypoints())
+    page.swatch(1, 0, on_white(PROGRAMMED, BAND_OPACITY))
     page.text(1, 32, "programmed")
     page.swatch(1, 140, CORRECTED)
     page.text(1, 172, f"corrected: {corrected}")
     if course.fine.outside.any():
-        page.swatch(1, 480, OUTSIDE)
-        page.text(1, 512, "joints not measured")
+        page.swatch(1, 540, on_white(OUTSIDE, BAND_OPACITY))
+        page.text(1, 572, "joints not measured")
     page.swatch(2, 0, UNCORRECTED if by_error is None else None)
     page.text(2, 32, f"real tool today: {real}")
     if by_error is not None:
-        page.scale(2, 492, 140, by_error)
-    page.text(3, 0, "  ·  ".join(text for part, text in PARTS.items() if visible[part]), pale=True)
+        page.scale(2, 512, 130, by_error)
+    if model_error is not None:
+        known = f"{model_error.mean:.3f} mm (mean), {model_error.max:.3f} mm (max)"
+        page.text(3, 0, f"the calibration itself was off by {known} on measured poses that it had not seen")
+    page.text(4, 0, "  ·  ".join(text for part, text in PARTS.items() if visible[part]), pale=True)
 
 
 def draw_place(figure: Figure, course: Course, share: float, chosen: int | None, keys: bool | None) -> None:
@@ -93,7 +108,7 @@ def place_in_words(course: Course, share: float) -> str:
         where = f"line {shown.line[waypoint]}"
     label = shown.labels[waypoint] if shown.labels else ""
     known = "; joints not measured here" if unknown else ""
-    numbers = f"{real:.2f} mm off today, {corrected:.3f} mm corrected{known}"
+    numbers = f"{real:.2f} mm off today, {in_mm(corrected)} mm corrected (predicted){known}"
     said = f"{where}: {numbers}"
     room = LONGEST - len(said) - 3
     return said + (f"   {shorten(label, room, placeholder=' …')}" if label and room > 10 else "")

@@ -17,7 +17,7 @@ from truepath.mounts import Mount, mounts_on_the_way, welds_inboard
 
 if TYPE_CHECKING:
     from pydrake.multibody.plant import MultibodyPlant
-    from pydrake.multibody.tree import Frame
+    from pydrake.multibody.tree import FixedOffsetFrame, Frame
     from pydrake.systems.framework import Context
 
     from truepath.host.arm_in_plant import ArmInPlant
@@ -36,12 +36,13 @@ class AppliedFrames:
 
     Attributes:
         frames: names of the frames that were moved.
-        base: ``as drawn``: no calibration of it, or not wanted; ``frame``: the frame that the base is welded to was
-            moved; ``joints``: that frame cannot be moved, so the arm from its first joint on was, and the body of
-            the base stays as drawn.
-        tool: ``as drawn`` on the flange; ``frame``: what holds the tool was moved, and all of the tool with it;
-            ``frame alone``: the tool frame was moved, and the body that it is on, with its shapes, stays as drawn on
-            the flange; ``with flange``: flange and tool were moved as one, so that the tool is right.
+        base: ``as drawn``: no calibration of it, or not wanted, so that it stays as the context has it; ``frame``: the
+            frame that the base is welded to was moved; ``joints``: that frame cannot be moved, so the arm from its
+            first joint on was, and the body of the base stays as drawn.
+        tool: ``as drawn`` on the flange, or as the context has it there; ``frame``: what holds the tool was moved, and
+            all of the tool with it; ``frame alone``: the tool frame was moved, and the body that it is on, with its
+            shapes, stays as drawn on the flange; ``with flange``: flange and tool were moved as one, so that the tool
+            is right.
         left_out: what the calibration knows and no frame can carry; ``JointCorrection`` and ``CalibratedRobot`` do.
         flange: ``frame``: it is where the calibration has it; ``with tool``: it was moved as one with the tool;
             ``as drawn``: on the last link, whose axis is right, because nothing between them can be moved.
@@ -59,32 +60,40 @@ def apply_frames(robot: PlacedRobot, context: Context, *, base: bool, tool: Tool
     if tool not in (True, False, WITH_FLANGE):
         raise InputError("unknown way to set the tool", expected=f"True, False or {WITH_FLANGE!r}", found=repr(tool))
     place = _place(robot)
-    reset_frames(place, context)
+    frames = _movable(place, base=True, tool=True)
+    before = [frame.GetPoseInParentFrame(context) for frame in frames]
     try:
         return _set_frames(robot, place, context, base, tool)
     except InputError:
-        reset_frames(place, context)  # nothing by halves
+        for frame, X_PF in zip(frames, before, strict=True):  # nothing by halves
+            frame.SetPoseInParentFrame(context, X_PF)
         raise
 
 
 def _set_frames(robot: PlacedRobot, place: ArmInPlant, context: Context, base: bool, tool: ToolWay) -> AppliedFrames:
-    plant, arm = place.plant, place.arm
-    X_BB, base_how = lie.invert(robot.X_WB) @ robot.X_WB_real, "as drawn"
+    plant, arm, knows_tool = place.plant, place.arm, tool is not False and robot.knows_tool
+    reset_frames(place, context, base=base and robot.knows_base, tool=knows_tool)
+    X_FT = robot.X_FT_real
+    if place.tool is not None and not knows_tool:
+        X_FT = place.tool.CalcPose(context, arm.flange).GetAsMatrix4()
+    X_BB, base_how = np.eye(4), "as drawn"
     moved = list(joint_frames(arm))
-    if base and not _same(X_BB, np.eye(4)):
+    if base and not _same(robot.X_WB, robot.X_WB_real):
         mount, base_how = _base_mount(place), "joints"
         if mount is not None:
             base_how = "frame"
             mount.move(context, robot.X_WB_real @ lie.invert(robot.X_WB))
             moved.append(mount.frame)
-    move_arm_frames(robot.model, plant, arm, context, X_BB=X_BB if base_how == "joints" else None)
+        else:
+            X_BB = lie.invert(robot.X_WB) @ robot.X_WB_real
+    move_arm_frames(robot.model, plant, arm, context, X_BB=X_BB)
     by_which = flange_mount(plant, arm)
     flange_how = "as drawn" if by_which is None else "frame"
     if by_which is not None:
         moved.append(by_which.frame)
     tool_how = "as drawn"
     if tool is not False and place.tool is not None:
-        X_WT = _real_flange(robot, place, context, base) @ robot.X_FT_real
+        X_WT = _real_flange(robot, place, context, X_BB) @ X_FT
         off = X_WT @ lie.invert(place.tool.CalcPoseInWorld(context).GetAsMatrix4())
         if not _same(off, np.eye(4)):
             mount, tool_how = _tool_mount(place, tool, X_WT[:3, 3] - place.tool.CalcPoseInWorld(context).translation())
@@ -97,16 +106,38 @@ def _set_frames(robot: PlacedRobot, place: ArmInPlant, context: Context, base: b
     return AppliedFrames(names, base_how, tool_how, left_out(robot.model), flange_how)
 
 
-def reset_frames(place: ArmInPlant, context: Context) -> None:
-    """Sets all frames that a calibration may have moved back to the plant's defaults."""
+def reset_frames(place: ArmInPlant, context: Context, *, base: bool = True, tool: bool = True) -> None:
+    """Sets all frames that a calibration may have moved back to the plant's defaults; those of base and tool if asked.
+
+    All but these belong to the arm itself: its joints and its flange.
+    """
+    default = place.plant.CreateDefaultContext()
+    for frame in _movable(place, base, tool):
+        frame.SetPoseInParentFrame(context, frame.GetPoseInParentFrame(default))
+
+
+def context_as_drawn(robot: PlacedRobot, context: Context | None) -> Context:
+    """A context of its own: all as in another one (None: the plant's defaults), the arm as if nothing were calibrated.
+
+    Base and tool are as drawn where the calibration knows them; where it does not, as the other context has them.
+    """
+    place = _place(robot)
+    own = place.plant.CreateDefaultContext()
+    if context is not None:
+        own.SetTimeStateAndParametersFrom(context)
+        reset_frames(place, own, base=robot.knows_base, tool=robot.knows_tool)
+    return own
+
+
+def _movable(place: ArmInPlant, base: bool, tool: bool) -> list[FixedOffsetFrame]:
     from pydrake.multibody.tree import FixedOffsetFrame
 
-    mounts = [*_tool_mounts(place), flange_mount(place.plant, place.arm), _base_mount(place)]
+    mounts = [flange_mount(place.plant, place.arm)]
+    mounts += _tool_mounts(place) if tool else []
+    mounts += [_base_mount(place)] if base else []
     frames = [joint.frame_on_parent() for joint in place.arm.joints]
-    default = place.plant.CreateDefaultContext()
-    for frame in [*frames, *(mount.frame for mount in mounts if mount is not None)]:
-        if isinstance(frame, FixedOffsetFrame):
-            frame.SetPoseInParentFrame(context, frame.GetPoseInParentFrame(default))
+    frames += [mount.frame for mount in mounts if mount is not None]
+    return [frame for frame in frames if isinstance(frame, FixedOffsetFrame)]
 
 
 def left_out(model: CalibratedModel) -> tuple[str, ...]:
@@ -126,14 +157,18 @@ def _same(X: Array, Y: Array) -> bool:
     return bool(np.abs(X - Y).max() < NOTHING)
 
 
-def _real_flange(robot: PlacedRobot, place: ArmInPlant, context: Context, base: bool) -> Array:
-    """``(4, 4)`` X_WF of the rigid part of the calibration, fixed to the last link, at the context's joints."""
+def _real_flange(robot: PlacedRobot, place: ArmInPlant, context: Context, X_BB: Array) -> Array:
+    """``(4, 4)`` X_WF of the rigid part of the calibration, fixed to the last link, at the context's joints.
+
+    Args:
+        X_BB: ``(4, 4)`` where the base stands, seen from where its body stands in the context.
+    """
     zero = place.plant.CreateDefaultContext()
     zero.SetTimeStateAndParametersFrom(context)
     for joint in place.arm.joints:
         joint.set_angle(zero, 0.0)
     link = place.arm.joints[-1].child_body().body_frame()
-    X_WF_zero = (robot.X_WB_real if base else robot.X_WB) @ robot.model.robot.X_BF
+    X_WF_zero = place.arm.base.CalcPoseInWorld(zero).GetAsMatrix4() @ X_BB @ robot.model.robot.X_BF
     X_LF = lie.invert(link.CalcPoseInWorld(zero).GetAsMatrix4()) @ X_WF_zero
     return link.CalcPoseInWorld(context).GetAsMatrix4() @ X_LF
 

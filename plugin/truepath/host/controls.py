@@ -45,7 +45,8 @@ class Controls:
         meshcat, spot = view.meshcat, view.spot
         self._meshcat = meshcat
         spot.remove_controls(meshcat)  # those of earlier ones of this view
-        self._path, self._magnify = spot.label(PATH), spot.label(MAGNIFY)
+        taken = (*meshcat.GetSliderNames(), *meshcat.GetButtonNames())  # of the host: they stay, and stay its own
+        self._path, self._magnify = spot.label(PATH, taken), spot.label(MAGNIFY, taken)
         actions: dict[str, Callable[[], None]] = {
             PLAY: self._play_or_stop,
             NEXT: lambda: self._step(1),
@@ -54,14 +55,10 @@ class Controls:
         }
         for label, part in SHOW.items():
             actions[label] = lambda part=part: view.show(part, not view.visible[part])  # type: ignore[misc]
-        self._actions = {spot.label(label): act for label, act in actions.items()}
+        self._actions = {spot.label(label, taken): act for label, act in actions.items()}
         spot.sliders += [self._path, self._magnify]
         spot.buttons += self._actions
         arrows = ("ArrowLeft", "ArrowRight") if spot.has_keys else ("", "")
-        for name in spot.sliders:  # should the host have such
-            meshcat.DeleteSlider(name, strict=False)
-        for name in spot.buttons:
-            meshcat.DeleteButton(name, strict=False)
         self._percent = meshcat.AddSlider(self._path, 0.0, 100.0, STEP_PERCENT, 100.0 * view.place, *arrows)
         self._factor = self._add_magnifier()
         keys = ("Space", "KeyN", "KeyB", "KeyC", *(f"Digit{k + 1}" for k in range(len(SHOW))))
@@ -74,6 +71,7 @@ class Controls:
     def poll(self) -> None:
         """Does what was asked for since the last time, and moves on if it plays; nothing once they are removed."""
         if self.is_removed:
+            self._forget_what_is_gone()
             return
         now, before = self._clock(), self._now
         self._now = now
@@ -109,8 +107,12 @@ class Controls:
 
     @property
     def is_removed(self) -> bool:
-        """Whether the view was taken away, by ``remove`` or by another view in its place."""
-        return self.view.is_removed
+        """Whether they are no more: taken away by ``remove``, by another view in its place, or by the host itself."""
+        if not self.view.is_removed:
+            there = {*self._meshcat.GetSliderNames(), *self._meshcat.GetButtonNames()}
+            if {self._path, self._magnify, *self._actions} <= there:
+                return False
+        return True
 
     def remove(self) -> None:
         """Takes the controls and the view away; those of the host and of other views stay."""
@@ -122,6 +124,12 @@ class Controls:
         step = 1.0 if factor >= 1.0 else factor
         largest = max(LARGEST, np.ceil(factor / step) * step)
         return self._meshcat.AddSlider(self._magnify, step, float(largest), step, factor)
+
+    def _forget_what_is_gone(self) -> None:
+        """What the host took away is not ours any more, should it put something of that name there."""
+        spot = self.view.spot
+        spot.sliders = [name for name in spot.sliders if name in self._meshcat.GetSliderNames()]
+        spot.buttons = [name for name in spot.buttons if name in self._meshcat.GetButtonNames()]
 
     def _go_to(self, share: float) -> None:
         self.view.go_to(share)

@@ -3,81 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from truepath import lie
-from truepath.errors import InputError
 from truepath.host.placed_robot import PlacedRobot
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
-from truepath.preview.shown import Remark, ShownPath, require_joints
+from truepath.preview.shown import Remark, ShownPath
 from truepath.preview.thinning import LINE_LIMIT, thin_out
 from truepath.preview.toolpaths import FinePaths, Toolpaths
-
-if TYPE_CHECKING:
-    from truepath.controller import Controller
-    from truepath.host.plugin import CalibrationPlugin
-    from truepath.rewriting.options import RewriteOptions
-    from truepath.rewriting.rewrite import RewrittenProgram
 
 JOINT_SPEED_RAD_S, TOOL_SPEED_M_S = 0.6, 0.1
 SHORTEST_S, LONGEST_S = 6.0, 60.0
 METRES_PER_RAD, ERROR_WEIGHT = 0.3, 50.0  # what joints and errors count when points are chosen
-
-
-def opened_program(
-    plugin: CalibrationPlugin, file: str | Path, options: RewriteOptions | None
-) -> tuple[RewrittenProgram, Controller, str | None]:
-    """A program corrected, the controller that it was corrected for, and its text if it has statements to show.
-
-    Raises:
-        InputError, CorrectionError: as ``correct``; a program without a target.
-    """
-    from truepath.controller import controller_of
-    from truepath.rewriting.open import SCRIPTS
-    from truepath.rewriting.options import RewriteOptions
-
-    options = options or RewriteOptions()
-    done = plugin.correct(file, options=options)
-    if not len(done.plan):
-        raise InputError("there is nothing to show", file=file, expected="targets that can be resolved")
-    is_script = Path(file).suffix.lower() in SCRIPTS
-    text = Path(file).read_bytes().decode("utf-8", "replace") if is_script else None
-    return done, controller_of(plugin.robot, options.controller_kinematics), text
-
-
-def shown_path(
-    plugin: CalibrationPlugin, program: Any, corrected: Array | None = None, options: RewriteOptions | None = None
-) -> ShownPath:
-    """Programmed and corrected joints of whatever ``CalibrationPlugin.correct`` takes.
-
-    Args:
-        corrected: ``(N, n)`` corrected joints, if the program is joints; None: they are worked out.
-        options: if the program is a file.
-
-    Raises:
-        InputError, CorrectionError: as ``correct``; a program without a target, paths that differ, joints that are
-            no numbers, corrected joints or options for another kind of program.
-    """
-    is_file = isinstance(program, (str, Path))
-    is_trajectory = not is_file and hasattr(program, "start_time")
-    if corrected is not None and (is_file or is_trajectory):
-        raise InputError("only joints come with joints that correct them", expected="corrected=None")
-    if options is not None and not is_file:
-        raise InputError("these options are for the file of a program", expected="options=None")
-    if is_file:
-        return ShownPath.of_program(*opened_program(plugin, program, options))
-    if is_trajectory:
-        moved = plugin.correct(program)
-        at = (program.vector_values(moved.time_s).T, moved.trajectory.vector_values(moved.time_s).T)
-        return ShownPath.of_joints(*at, [f"{time:.2f} s" for time in moved.time_s])
-    q = np.atleast_2d(np.asarray(program, float))
-    q_corrected = plugin.correct(q).q_rad if corrected is None else np.atleast_2d(np.asarray(corrected, float))
-    require_joints(q, q_corrected, plugin.robot.num_joints)
-    return ShownPath.of_joints(q, q_corrected)
 
 
 @dataclass(frozen=True, eq=False)

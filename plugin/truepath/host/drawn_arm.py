@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, Rgba, SceneGraph, Shape
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.systems.framework import Context
 
 PLAIN = (0.78, 0.79, 0.81, 1.0)  # of shapes that state no colour
 BONE_RADIUS_SHARE, JOINT_BALL, TOOL_ROD = 0.025, 1.3, 0.35  # of the arm's length; in radii of a bone
@@ -31,6 +32,8 @@ class DrawnArm:
         place: the arm.
         scene_graph: with which its plant is registered; None: rods from joint to joint stand for the shapes.
         paint: colour for all of it, alpha included; None: its own.
+        context: of the plant, for all but the joints of the arm, such as the fingers of a gripper; it is copied.
+            None: as the plant has it by default.
     """
 
     def __init__(
@@ -40,9 +43,12 @@ class DrawnArm:
         place: ArmInPlant,
         scene_graph: SceneGraph | None,
         paint: Rgba | None = None,
+        context: Context | None = None,
     ) -> None:
         self._meshcat, self._place, plant = meshcat, place, place.plant
         self._context = plant.CreateDefaultContext()
+        if context is not None:
+            self._context.SetTimeStateAndParametersFrom(context)
         self._positions = plant.GetPositions(self._context)
         moved = [] if scene_graph is None else moved_bodies(place)
         self._bodies = {f"{path}/{body_path(body)}": body for body in moved}

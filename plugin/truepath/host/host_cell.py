@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ from truepath.cell_geometry import GeometryPairs, floors_as_boxes
 from truepath.errors import InputError
 from truepath.guards import Finding
 from truepath.host.arm_in_plant import ArmInPlant
-from truepath.host.context_frames import WITH_FLANGE, ToolWay, apply_frames
+from truepath.host.context_frames import WITH_FLANGE, ToolWay, apply_frames, context_as_drawn
 from truepath.host.placed_robot import PlacedRobot
 from truepath.model import CalibratedModel
 from truepath.posed_cell import PosedCell
@@ -26,14 +26,12 @@ class HostCell:
     """The plant around an arm.
 
     Attributes:
-        place: the arm.
-        region: of joints that were measured.
+        robot: the calibrated one in its place: where it knows base and tool, these are not taken from the context.
         scene_graph: with which the plant is registered.
         context: of the plant: where all else stands, and what frames the host has moved; None: as drawn.
     """
 
-    place: ArmInPlant
-    region: Region
+    robot: PlacedRobot
     scene_graph: SceneGraph
     context: Context | None = None
 
@@ -49,11 +47,10 @@ class HostCell:
         """See ``Surroundings``. Where the tool can only be moved together with the flange, both are."""
         from pydrake.common.value import Value
 
-        place, scene_graph = self.place, self.scene_graph
-        plant, context = place.plant, place.plant.CreateDefaultContext()
-        if self.context is not None:
-            context.SetTimeStateAndParametersFrom(self.context)
-        self._set_frames(PlacedRobot(model, self.region, place.robot.X_WB, place.X_FT, place), context)
+        place, scene_graph = self.robot.place, self.scene_graph
+        assert place is not None, "a robot in a host's plant"
+        plant, context = place.plant, context_as_drawn(self.robot, self.context)
+        self._set_frames(replace(self.robot, model=model), context)
         shapes = scene_graph.CreateDefaultContext()
         floors_as_boxes(plant, scene_graph, shapes)
         poses_in = scene_graph.get_source_pose_port(plant.get_source_id())
@@ -89,7 +86,7 @@ def host_cell(
         return _nowhere(
             "the plugin was not given the SceneGraph of the host's plant: CalibrationPlugin(scene_graph=...)"
         )
-    cell = HostCell(place, region, scene_graph, context)
+    cell = HostCell(PlacedRobot(model, region, place.robot.X_WB, place.X_FT, place), scene_graph, context)
     try:
         posed = cell.with_robot(model)
     except InputError as error:

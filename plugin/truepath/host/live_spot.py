@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -42,9 +43,17 @@ class Spot:
         """Whether the keyboard works its controls: only those of one view at a time."""
         return self.number == 0
 
-    def label(self, text: str) -> str:
-        """Of a control: plain for the first view, with the name of the arm for others."""
-        return text if self.has_keys else f"{text.split(' (')[0]} · {self.name}"
+    def label(self, text: str, taken: Collection[str] = ()) -> str:
+        """Of a control: plain for the first view, with the name of the arm for others.
+
+        Args:
+            taken: labels of controls of the host's own, which no other gets.
+        """
+        without_key = f"{text.split(' (')[0]} · {self.name}"
+        label, k = text if self.has_keys else without_key, 1
+        while label in taken:
+            label, k = without_key if k == 1 else f"{without_key} {k}", k + 1
+        return label
 
     def hide(self, meshcat: Meshcat, paths: list[str]) -> None:
         """Hides what the host drew, as far as it is there, until all is given back."""

@@ -17,6 +17,7 @@ from truepath.host.on_screen import Pane
 from truepath.host.placed_robot import PlacedRobot
 from truepath.lie import Array
 from truepath.preview.colours import (
+    BAND_OPACITY,
     CORRECTED,
     OUTSIDE,
     PROGRAMMED,
@@ -32,6 +33,9 @@ from truepath.preview.toolpaths import Magnification, magnification_of
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, Rgba, SceneGraph
+    from pydrake.systems.framework import Context
+
+    from truepath.calibration_parts import StatisticsPart
 
 PARTS = (
     "programmed",
@@ -44,7 +48,8 @@ PARTS = (
     "region",
 )
 PREFIXES_OF_DRAKE = ("visualizer", "illustration")  # of MeshcatVisualizer; of AddDefaultVisualization
-GHOST_OPACITY, BAND_OPACITY, REGION_OPACITY, HIDDEN_OPACITY = 0.3, 0.45, 0.08, 0.3
+HIDDEN_AT_FIRST = ("region",)  # it lies around all else, and fogs it
+GHOST_OPACITY, REGION_OPACITY, HIDDEN_OPACITY = 0.3, 0.08, 0.3
 MOST_VECTORS, MOST_FRAMES = 66, 12
 LINE_SHARE, BAND, POINT_SHARE, FRAME_SHARE, MARKER_SHARE = 0.0022, 2.6, 0.010, 0.05, 0.028  # of the size of the robot
 GAP_PX = 2  # between panes
@@ -55,9 +60,8 @@ class LiveView:
 
     Parts, which can be shown and hidden: the lines of the tool ``programmed``, ``real`` (today) and ``corrected``; the
     arms ``arm_uncorrected`` (a ghost) and ``arm_corrected``; ``error_vectors``, from where the tool is meant to be to
-    where it is today; ``tool_frames`` at some waypoints; ``region``, around all
-    places where the calibration knows the flange in some posture.
-    Errors are drawn larger than they are, and the arms with their tools on the lines as drawn.
+    where it is today; ``tool_frames`` at some waypoints; ``region``, hidden at first, around all places where the
+    calibration knows the flange in some posture. Errors are drawn larger than they are, and the arms on these lines.
 
     Draws with contexts of its own: nothing of the host's plant is changed. Of the host's scene it hides the arm, where
     the host draws that itself, and turns the camera if told so (``look``).
@@ -71,6 +75,8 @@ class LiveView:
         magnification: factor by which errors are drawn, or "auto".
         title: of the legend.
         controls: whether there will be some, as the text says.
+        context: of the plant, in which all but the joints of the arm stands as it is to be drawn; None: the default.
+        model_error: of the calibration on poses that it had not seen, for the legend; None: unknown.
 
     Raises:
         InputError: a magnification that makes no sense. Nothing is drawn then.
@@ -87,13 +93,16 @@ class LiveView:
         magnification: Magnification = 50.0,
         title: str = "",
         controls: bool = True,
+        context: Context | None = None,
+        model_error: StatisticsPart | None = None,
     ) -> None:
         assert robot.place is not None, "a robot in a host's plant"
         self.meshcat, self.robot, self.course, self.title = meshcat, robot, course, title
         self.place, self.by_error = 0.0, True
         self.magnification = magnification_of(course.fine.paths.at(course.fine.waypoint), magnification)
         self.chosen: int | None = None
-        self.visible = dict.fromkeys(PARTS, True)
+        self.visible = {part: part not in HIDDEN_AT_FIRST for part in PARTS}
+        self._model_error = model_error
         plant = robot.place.plant
         self.spot = take_spot(meshcat, plant.GetModelInstanceName(robot.place.arm.instance), self)
         self._prefix, self._keys = self.spot.prefix, self.spot.has_keys if controls else None
@@ -101,7 +110,7 @@ class LiveView:
         p_B = (course.meant - robot.X_WB[:3, 3]) @ robot.X_WB[:3, :3]
         self._size = max(float(np.linalg.norm(p_B, axis=1).max()), 0.1)
         self._scale_mm = scale_end_mm(course.real_mm)
-        self._arms = self._make_arms(scene_graph)
+        self._arms = self._make_arms(scene_graph, context)
         prefixes = PREFIXES_OF_DRAKE if drawn_below is None else (drawn_below,)
         own = [body_path(body) for body in moved_bodies(robot.place)]
         self.spot.hide(meshcat, [f"{prefix.rstrip('/')}/{path}" for prefix in prefixes for path in own])
@@ -152,11 +161,11 @@ class LiveView:
         chosen = (0 if by > 0 else len(remarks) - 1) if self.chosen is None else (self.chosen + by) % len(remarks)
         self.chosen = chosen
         waypoint = remarks[chosen].waypoint
-        if waypoint is not None:
+        if waypoint is None:
+            self.meshcat.Delete(f"{self._prefix}/warning")
+        else:
             self.go_to(self.course.share_of(waypoint))
             self._mark(self.course.meant[self.course.fine.waypoint[waypoint]])
-        else:
-            self.meshcat.Delete(f"{self._prefix}/warning")
         self.write_place()
         return remarks[chosen].text
 
@@ -169,9 +178,8 @@ class LiveView:
 
     def write_legend(self) -> None:
         """Writes what the lines and parts are."""
-        figure = self._legend.figure()
-        scale = self._scale_mm if self.by_error else None
-        draw_legend(figure, self.course, self.title, self.magnification, scale, self.visible)
+        figure, scale = self._legend.figure(), self._scale_mm if self.by_error else None
+        draw_legend(figure, self.course, self.title, self.magnification, scale, self.visible, self._model_error)
         self._legend.put(figure)
 
     def write_place(self) -> None:
@@ -208,7 +216,9 @@ class LiveView:
         self.spot.paths += [legend.path, place.path]
         return legend, place
 
-    def _make_arms(self, scene_graph: SceneGraph | None) -> list[tuple[str, DrawnArm, Array, Array]]:
+    def _make_arms(
+        self, scene_graph: SceneGraph | None, context: Context | None
+    ) -> list[tuple[str, DrawnArm, Array, Array]]:
         from pydrake.geometry import Sphere
 
         arms, place = [], self.robot.place
@@ -218,7 +228,7 @@ class LiveView:
             ("arm_uncorrected", UNCORRECTED, _rgba(UNCORRECTED, GHOST_OPACITY)),
         ):
             path, nothing = f"{self._prefix}/{name}", np.zeros((0, 3))
-            arms.append((name, DrawnArm(self.meshcat, path, place, scene_graph, paint), nothing, nothing))
+            arms.append((name, DrawnArm(self.meshcat, path, place, scene_graph, paint, context), nothing, nothing))
             self.meshcat.SetObject(f"{path}/tool_point", Sphere(POINT_SHARE * self._size), _rgba(colour))
         return arms
 
@@ -271,14 +281,13 @@ class LiveView:
     def _mark(self, p_W: Array) -> None:
         from pydrake.geometry import Sphere
 
-        path = f"{self._prefix}/warning"
-        self.meshcat.SetObject(path, Sphere(MARKER_SHARE * self._size), _rgba(OUTSIDE, 0.5))
+        self.meshcat.SetObject(
+            path := f"{self._prefix}/warning", Sphere(MARKER_SHARE * self._size), _rgba(OUTSIDE, 0.5)
+        )
         self._move(path, p_W)
 
     def _move(self, path: str, p_W: Array) -> None:
-        from pydrake.math import RigidTransform
-
-        self.meshcat.SetTransform(path, RigidTransform(p_W))
+        self.meshcat.SetTransform(path, np.asfortranarray(lie.make_pose(translation=p_W)))
 
     def _set_visible(self, part: str, visible: bool) -> None:
         self.meshcat.SetProperty(f"{self._prefix}/{part}", "visible", visible)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,8 @@ from truepath.model import CalibratedModel, nominal_flange_poses
 from truepath.region import Region
 
 if TYPE_CHECKING:
+    from pydrake.systems.framework import Context
+
     from truepath.host.arm_in_plant import ArmInPlant
 
 
@@ -33,6 +35,7 @@ class PlacedRobot:
         X_WB, X_FT: ``(4, 4)`` base and tool as the host has them.
         place: the arm in the host's plant; None: there is no plant.
         X_WB_real, X_FT_real: ``(4, 4)`` the same as they are.
+        knows_base, knows_tool: whether the calibration tells these two apart from where the host has them.
     """
 
     model: CalibratedModel
@@ -48,9 +51,21 @@ class PlacedRobot:
         object.__setattr__(self, "X_WB_real", self.X_WB @ lie.invert(X_BB))
         object.__setattr__(self, "X_FT_real", lie.invert(X_FF) @ self.X_FT)
 
+    @property
+    def knows_base(self) -> bool:
+        return self.model.base_is_given
+
+    @property
+    def knows_tool(self) -> bool:
+        return self.model.tool_is_given
+
     @classmethod
-    def of(cls, source: Calibrating | Calibration) -> PlacedRobot:
+    def of(cls, source: Calibrating | Calibration, context: Context | None = None) -> PlacedRobot:
         """Out of a plugin, or of a calibration alone: then with the base where its model's world has it, and no tool.
+
+        Args:
+            context: of the plugin's plant: for where base and tool are, if the calibration does not know them. None:
+                as the plant has them by default.
 
         Raises:
             InputError: a plugin without a calibration, or something else.
@@ -63,7 +78,19 @@ class PlacedRobot:
         calibration, place = source.calibration, source.place
         if calibration is None:
             raise InputError("the plugin has no calibration", expected="calibrate, load or use one first")
-        return cls(calibration.model, calibration.region.region(), place.robot.X_WB, place.X_FT, place)
+        robot = cls(calibration.model, calibration.region.region(), place.robot.X_WB, place.X_FT, place)
+        return robot if context is None else robot._standing_in(context)
+
+    def _standing_in(self, context: Context) -> PlacedRobot:
+        """The same with base and tool where a context of the plant has them, as far as nothing else is known."""
+        from truepath.host.context_frames import context_as_drawn
+
+        place = self.place
+        assert place is not None, "a robot in a host's plant"
+        own, X_FT = context_as_drawn(self, context), self.X_FT
+        if place.tool is not None:
+            X_FT = place.tool.CalcPose(own, place.arm.flange).GetAsMatrix4()
+        return replace(self, X_WB=place.arm.base.CalcPoseInWorld(own).GetAsMatrix4(), X_FT=X_FT)
 
     def flange_poses(self, q_rad: Array) -> Array:
         """``(N, 4, 4)`` real poses X_WF for commanded joints ``(N, n)``."""

@@ -112,7 +112,8 @@ class CalibrationPlugin(Showing):
             context: of a program or a trajectory: of the plant or of the diagram that holds it, for where everything
                 but the arm stands; it is only read. None: as the plant has it by default.
             collisions: of a program or a trajectory: whether they are looked for, in the host's plant unless a cell is
-                stated. Where that cannot be, a warning says so. Joints alone are not looked at.
+                stated (``none``: nowhere). Where that cannot be, a warning says so. Joints alone are not looked at.
+                What the correction brings about is refused; what the program does by itself is warned of.
 
         Returns:
             For joints a ``Correction``; for a file a ``RewrittenProgram``, of which nothing is written yet; for a
@@ -144,19 +145,23 @@ class CalibrationPlugin(Showing):
                 program, calibration, cell=options.cell, surroundings=options.surroundings, **how
             )
             return replace(corrected, findings=(*corrected.findings, *remarks))
-        return correct(calibration.model, program, region=calibration.region.region(), **how)
+        q_rad = np.atleast_2d(np.asarray(program, float))
+        if not np.isfinite(q_rad).all():
+            row = int(np.argmin(np.isfinite(q_rad).all(axis=1)))
+            raise InputError(f"the joints are no numbers at waypoint {row + 1}", found=str(q_rad[row]))
+        return correct(calibration.model, q_rad, region=calibration.region.region(), **how)
 
     def _with_surroundings(
         self, options: RewriteOptions | None, how: dict[str, Any]
     ) -> tuple[RewriteOptions, list[Finding]]:
         """Options that look for collisions in the host's plant, if nowhere else is stated; and what is to be said."""
         from truepath.host.host_cell import HostCell, host_cell
-        from truepath.rewriting.options import RewriteOptions
+        from truepath.rewriting.options import NOWHERE, RewriteOptions
 
         options = RewriteOptions() if options is None else options
         context, wanted = how.pop("context", None), how.pop("collisions", True)
         own = None if context is None else self.place.context_of_the_plant(context)
-        if not wanted:
+        if not wanted or options.cell == NOWHERE:
             return replace(options, cell=None, surroundings=None), []
         if options.cell is not None or options.surroundings is not None:
             return options, []
@@ -174,7 +179,8 @@ class CalibrationPlugin(Showing):
         Inverse kinematics, collision checks and planners that are given this context then work with the real
         geometry. Set are, counted from the plant's defaults: the frame of every joint; the frame by which the flange
         hangs on the last link; where the calibration knows them against the host's world and tool, also base and
-        tool. Frames of other models stay as they are, and so do positions and velocities.
+        tool. Where it does not, or where that is not wanted, these stay as this context has them. Frames of other
+        models stay as they are, and so do positions and velocities.
 
         A base whose weld has no frame of its own (``WeldFrames(world, base, X)``) cannot be moved; then the arm from
         its first joint on is put where it really is, and only the body of the base stays as drawn. To have that
@@ -192,24 +198,27 @@ class CalibrationPlugin(Showing):
 
         Args:
             context: of the plant, or of the diagram that holds it.
-            base, tool: whether to set these; False leaves them as drawn. For the tool also ``with flange``.
+            base, tool: whether to set these; False leaves them as they are. For the tool also ``with flange``.
 
         Returns:
             What was set, and which effects of this calibration were left out.
 
         Raises:
             InputError: no calibration; a context of something else; a joint or a tool whose frame cannot be moved. The
-                frames are then those of the plant's defaults.
+                frames are then as they were.
         """
         self._in_use()
         own = self.place.context_of_the_plant(context)
         return apply_frames(PlacedRobot.of(self), own, base=base, tool=tool)
 
     def reset(self, context: Context) -> None:
-        """Sets all frames that ``apply`` may have moved back to the plant's defaults.
+        """Sets all frames that ``apply`` may have moved back to the plant's defaults, base and tool among them.
 
         Args:
             context: of the plant, or of the diagram that holds it.
+
+        Raises:
+            InputError: a context of something else.
         """
         reset_frames(self.place, self.place.context_of_the_plant(context))
 

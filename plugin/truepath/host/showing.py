@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast, overload
+from typing import TYPE_CHECKING, cast, overload
 
 from truepath.errors import InputError
 from truepath.host.arm_in_plant import ArmInPlant
+from truepath.host.asked import Asked
 from truepath.host.calibrating import Calibrating
 from truepath.host.placed_robot import PlacedRobot
 from truepath.lie import Array
@@ -15,6 +17,7 @@ from truepath.plants import HOSTS_PLANT
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, SceneGraph
+    from pydrake.systems.framework import Context
     from pydrake.trajectories import Trajectory
 
     from truepath.host.controls import Controls
@@ -49,6 +52,10 @@ class Showing(Calibrating):
         corrected: Array | None = None,
         *,
         options: RewriteOptions | None = None,
+        context: Context | None = None,
+        collisions: bool = True,
+        max_correction_mm: float | None = None,
+        tolerance_mm: float | None = None,
         magnification: Magnification = MAGNIFICATION,
         waypoint: int | None = None,
         scene_graph: SceneGraph | None = None,
@@ -64,6 +71,10 @@ class Showing(Calibrating):
         corrected: Array | None = None,
         *,
         options: RewriteOptions | None = None,
+        context: Context | None = None,
+        collisions: bool = True,
+        max_correction_mm: float | None = None,
+        tolerance_mm: float | None = None,
         magnification: Magnification = MAGNIFICATION,
         output: str | Path,
         robot_source: str | Path | None = None,
@@ -75,6 +86,10 @@ class Showing(Calibrating):
         corrected: Array | None = None,
         *,
         options: RewriteOptions | None = None,
+        context: Context | None = None,
+        collisions: bool = True,
+        max_correction_mm: float | None = None,
+        tolerance_mm: float | None = None,
         magnification: Magnification = MAGNIFICATION,
         waypoint: int | None = None,
         scene_graph: SceneGraph | None = None,
@@ -87,13 +102,18 @@ class Showing(Calibrating):
 
         In the host's Meshcat, below ``/truepath/`` and the name of the arm's model: the three paths with a legend and a
         colour bar, the arm today as a ghost and the corrected one, arrows of the errors with their magnification,
-        frames of the tool, and the region that was measured. What this plugin showed before goes. Or as a page, which
-        is the one that ``truepath preview`` writes. The tool is that of the program; if it states none, of the plugin.
+        and frames of the tool; the region that was measured is there, but hidden. What this plugin showed before goes.
+        Or as a page, like the one that ``truepath preview`` writes. The tool is that of the program; if it states none,
+        of the plugin. What ``correct`` refuses or warns of, this does too, told the same.
 
         Args:
             program: as ``correct`` takes it.
-            corrected: ``(N, n)`` corrected joints, if the program is joints; None: they are worked out.
-            options: if the program is a file.
+            corrected: ``(N, n)`` corrected joints, if the program is joints; None: they are worked out. A warning says
+                where they are further from the program than a correction may be.
+            options: if the program is a file; its largest correction and tolerance are among them.
+            context, collisions, max_correction_mm, tolerance_mm: as ``correct`` has them; None: its defaults. All but
+                the joints of the arm is drawn as the context has it: the fingers of a gripper, and base and tool where
+                the calibration does not know them. It is only read.
             magnification: factor by which errors are drawn, or "auto" for a round one that makes them visible.
             waypoint: at which the arms are, counted from 1; None: where the tool is off most today.
             scene_graph: with which the plant is registered, for the shapes of the arm; None: that of the plugin; if it
@@ -111,18 +131,22 @@ class Showing(Calibrating):
                 makes no sense; as ``correct`` and ``write_preview``. What was shown before then stays.
             CorrectionError: a guard forbids the correction.
         """
+        asked = Asked(program, corrected, options, context, collisions, max_correction_mm, tolerance_mm)
         if output is not None:
-            return self._write_page(program, corrected, options, magnification, Path(output), robot_source)
+            return self._write_page(asked, magnification, Path(output), robot_source)
         self._in_use()
         self._host_meshcat()
         from truepath.host.live import PathsShown
 
-        shown = self._path(program, corrected, options)
+        shown = asked.shown(cast("CalibrationPlugin", self))
         count = len(shown.waypoint)
-        if waypoint is not None and not 1 <= waypoint <= count:
-            raise InputError("there is no such waypoint", expected=f"1 to {count}", found=str(waypoint))
-        view = self._draw(program, shown, scene_graph, drawn_below, magnification, controls=False)
-        at = view.course.worst if waypoint is None else waypoint - 1
+        is_one = isinstance(waypoint, Integral) and not isinstance(waypoint, bool) and 1 <= waypoint <= count
+        if waypoint is not None and not is_one:
+            raise InputError(
+                "there is no such waypoint", expected=f"a whole number from 1 to {count}", found=repr(waypoint)
+            )
+        view = self._draw(asked, shown, scene_graph, drawn_below, magnification, controls=False)
+        at = view.course.worst if waypoint is None else int(waypoint) - 1
         view.go_to(view.course.share_of(at))
         view.write_place()
         if look:
@@ -135,6 +159,10 @@ class Showing(Calibrating):
         corrected: Array | None = None,
         *,
         options: RewriteOptions | None = None,
+        context: Context | None = None,
+        collisions: bool = True,
+        max_correction_mm: float | None = None,
+        tolerance_mm: float | None = None,
         magnification: Magnification = MAGNIFICATION,
         scene_graph: SceneGraph | None = None,
         drawn_below: str | None = None,
@@ -149,7 +177,8 @@ class Showing(Calibrating):
         controls of the others have the name of their arm.
 
         Args:
-            program, corrected, options, magnification, scene_graph, drawn_below, look: as ``preview``.
+            program, corrected, options, context, collisions, max_correction_mm, tolerance_mm: as ``preview``.
+            magnification, scene_graph, drawn_below, look: as ``preview``.
             say: is told each warning that the operator steps to.
 
         Raises:
@@ -159,8 +188,9 @@ class Showing(Calibrating):
         self._host_meshcat()
         from truepath.host.controls import Controls
 
-        shown = self._path(program, corrected, options)
-        view = self._draw(program, shown, scene_graph, drawn_below, magnification, controls=True)
+        asked = Asked(program, corrected, options, context, collisions, max_correction_mm, tolerance_mm)
+        shown = asked.shown(cast("CalibrationPlugin", self))
+        view = self._draw(asked, shown, scene_graph, drawn_below, magnification, controls=True)
         if look:
             view.look()
         return Controls(view, say)
@@ -173,25 +203,21 @@ class Showing(Calibrating):
 
     # --- how ------------------------------------------------------------------------------------------------
 
-    def _path(self, program: Any, corrected: Array | None, options: RewriteOptions | None) -> ShownPath:
-        from truepath.host.course import shown_path
-
-        return shown_path(cast("CalibrationPlugin", self), program, corrected, options)
-
     def _draw(
         self,
-        program: Any,
+        asked: Asked,
         shown: ShownPath,
         scene_graph: SceneGraph | None,
         drawn_below: str | None,
         magnification: Magnification,
         controls: bool,
     ) -> LiveView:
+        from truepath.host.context_frames import context_as_drawn
         from truepath.host.course import Course
         from truepath.host.live_view import LiveView
         from truepath.preview.toolpaths import magnification_of
 
-        robot = PlacedRobot.of(self)
+        robot = self._placed(asked)
         course = Course.of(robot, shown)
         factor = magnification_of(course.fine.paths.at(course.fine.waypoint), magnification)
         self.remove()  # not before it is sure that there is something to take its place
@@ -202,53 +228,45 @@ class Showing(Calibrating):
             scene_graph=self.scene_graph if scene_graph is None else scene_graph,
             drawn_below=drawn_below,
             magnification=factor,
-            title=f"{_name(program)} on {self.robot.name}",
+            title=f"{asked.title} on {self.robot.name}",
             controls=controls,
+            context=None
+            if asked.context is None
+            else context_as_drawn(robot, self.place.context_of_the_plant(asked.context)),
+            model_error=None if (heldout := self._in_use().heldout) is None else heldout.calibrated.position_mm,
         )
         return self._view
 
     def _write_page(
-        self,
-        program: Any,
-        corrected: Array | None,
-        options: RewriteOptions | None,
-        magnification: Magnification,
-        output: Path,
-        robot_source: str | Path | None,
+        self, asked: Asked, magnification: Magnification, output: Path, robot_source: str | Path | None
     ) -> PreviewSummary:
-        from truepath.host.course import opened_program
-        from truepath.preview import write_preview, write_program_preview
+        from truepath.preview import write_shown
 
         calibration = self._in_use()
         if robot_source is None and calibration.robot.source == HOSTS_PLANT:
             raise InputError("a page needs the shapes of the arm", expected="robot_source: a built-in name or a URDF")
-        how: dict[str, Any] = {
-            "robot_source": robot_source or calibration.robot.source,
-            "magnification": magnification,
-            "title": _name(program),
-            "tool": self._tool(),
-        }
-        if isinstance(program, (str, Path)) and corrected is None:
-            rewritten, controller, text = opened_program(cast("CalibrationPlugin", self), program, options)
-            return write_program_preview(output, calibration, rewritten, controller, text=text, **how)
-        shown = self._path(program, corrected, options)
-        return write_preview(output, calibration, shown.q_meant, shown.q_corrected, labels=shown.labels or None, **how)
+        return write_shown(
+            output,
+            calibration,
+            asked.shown(cast("CalibrationPlugin", self)),
+            robot_source or calibration.robot.source,
+            magnification,
+            asked.title,
+            self._tool(asked),
+        )
 
-    def _tool(self) -> HostTool:
+    def _tool(self, asked: Asked) -> HostTool:
         from truepath.preview import HostTool
 
         frame = self.place.tool
         name = "the flange" if frame is None else f"the tool frame {frame.name()!r}"
-        return HostTool(self.place.X_FT, name)
+        return HostTool(self._placed(asked).X_FT, name)
+
+    def _placed(self, asked: Asked) -> PlacedRobot:
+        """The robot, standing where the context that was stated has it."""
+        return PlacedRobot.of(self, None if asked.context is None else self.place.context_of_the_plant(asked.context))
 
     def _host_meshcat(self) -> Meshcat:
         if self.meshcat is None:
             raise InputError("there is nothing to draw in", expected="a meshcat given to the plugin, or an output")
         return self.meshcat
-
-
-def _name(program: Any) -> str:
-    """What it is called in a title."""
-    if isinstance(program, (str, Path)):
-        return Path(program).name
-    return "Trajectory" if hasattr(program, "start_time") else "Path of joints"

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from truepath.controller import Controller
     from truepath.rewriting.rewrite import RewrittenProgram
 
-__all__ = ["HostTool", "Magnification", "PreviewSummary", "write_preview", "write_program_preview"]
+__all__ = ["HostTool", "Magnification", "PreviewSummary", "write_preview", "write_program_preview", "write_shown"]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def write_preview(
             "labels and waypoints differ in number", expected=str(len(q_programmed)), found=str(len(labels))
         )
     shown = ShownPath.of_joints(q_programmed, q_corrected, labels)
-    return _write(Path(output), calibration, shown, robot_source, magnification, title, tool)
+    return write_shown(output, calibration, shown, robot_source, magnification, title, tool)
 
 
 def write_program_preview(
@@ -130,11 +130,11 @@ def write_program_preview(
     if not len(rewritten.plan):
         raise InputError("there is nothing to show", file=rewritten.file, expected="targets that can be resolved")
     shown = ShownPath.of_program(rewritten, controller, text)
-    return _write(Path(output), calibration, shown, robot_source, magnification, title, tool, report)
+    return write_shown(output, calibration, shown, robot_source, magnification, title, tool, report)
 
 
-def _write(
-    output: Path,
+def write_shown(
+    output: str | Path,
     calibration: Calibration,
     shown: ShownPath,
     robot_source: str | Path,
@@ -143,6 +143,8 @@ def _write(
     tool: HostTool | None,
     report: str | None = None,
 ) -> PreviewSummary:
+    """The same for a path with all that is to be said of it; arguments as above."""
+    output = Path(output)
     model, region = calibration.model, calibration.region.region()
     arm = read_arm(robot_source, model.robot, calibration.robot.name)
     outside = shown.outside(region)

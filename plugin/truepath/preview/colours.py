@@ -13,6 +13,7 @@ from truepath.lie import Array
 
 PROGRAMMED, UNCORRECTED, CORRECTED, OUTSIDE, FADED = "#3a3a3a", "#d55e00", "#0072b2", "#e69f00", "#cc79a7"
 REGION = "#009e73"
+BAND_OPACITY = 0.5  # of the programmed path: the corrected one is seen in it
 AXES = ("#cc3311", "#009988", "#0077bb")  # x, y, z: red, green, blue as everybody draws them
 ERROR_SCALE = ("#0d0887", "#41049d", "#6a00a8", "#8f0da4", "#b12a90", "#cc4778", "#e16462", "#f2844b")  # even steps
 NICE_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -27,6 +28,11 @@ def rgb(colour: str) -> int:
 def unit_rgb(colour: str) -> Array:
     """``(3,)`` red, green, blue from 0 to 1."""
     return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+
+
+def on_white(colour: str, opacity: float) -> str:
+    """What a colour is that white shines through."""
+    return "#" + "".join(f"{round(255 * (1 - opacity * (1 - channel))):02x}" for channel in unit_rgb(colour))
 
 
 def error_colours(error_mm: Array, largest_mm: float) -> Array:

@@ -19,6 +19,7 @@ from truepath.lie import Array
 from truepath.look import stylesheet
 from truepath.networks_along import NetworksAlong
 from truepath.preview import colours, scene
+from truepath.preview.figures import in_mm
 from truepath.preview.keyframes import KeyFrames
 from truepath.preview.payload import payload
 from truepath.preview.recorded import RecordedScene
@@ -86,7 +87,7 @@ def render(text: PageText, shown: ShownPath, recorded: RecordedScene, frames: Ke
     )
     larger = "" if text.magnification == 1 else f"errors drawn {text.magnification:g} times larger"
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["mm"] = _mm
+    environment.filters["mm"] = in_mm
     return environment.from_string(_read("page.html.jinja")).render(
         policy=policy,
         css=Markup(stylesheet() + _read("page.css")),
@@ -104,11 +105,6 @@ def render(text: PageText, shown: ShownPath, recorded: RecordedScene, frames: Ke
         has_region=text.has_region,
         notes=_notes(text),
     )
-
-
-def _mm(value: float) -> str:
-    """Micrometres are the last that matter; what is smaller but not zero is said to be so."""
-    return "< 0.001" if 0 < value < 0.0005 else f"{value:.3f}"
 
 
 def _notes(text: PageText) -> list[tuple[str, str]]:

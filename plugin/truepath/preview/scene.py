@@ -15,6 +15,7 @@ from truepath.model import CalibratedModel
 from truepath.networks_along import NetworksAlong
 from truepath.preview.arm import Arm
 from truepath.preview.colours import (
+    BAND_OPACITY,
     CORRECTED,
     FADED,
     OUTSIDE,
@@ -109,7 +110,7 @@ def _draw_paths(stage: Stage, drawing: Drawing) -> None:
     """The three lines. The programmed one is a wide pale band, so that the corrected one shows inside it."""
     fine, paths, radius = drawing.fine, drawing.fine.paths.magnified(drawing.magnification), LINE * stage.size
     shades = np.where(fine.outside[:, None], unit_rgb(OUTSIDE), unit_rgb(PROGRAMMED))
-    band = stage.shaded(opacity=0.5, **FAR_WALLS_ONLY)
+    band = stage.shaded(opacity=BAND_OPACITY, **FAR_WALLS_ONLY)
     stage.line(PATH_PROGRAMMED, paths.goal, fine.piece, BAND * radius, band, shades)
     by_error = error_colours(fine.paths.errors_mm()[0], drawing.scale_mm)
     stage.line(PATH_UNCORRECTED, paths.uncorrected, fine.piece, 1.4 * radius, None, by_error)

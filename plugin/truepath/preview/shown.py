@@ -65,6 +65,7 @@ class ShownPath:
         labels: T texts; empty for none.
         X_FT: ``(4, 4)`` the tool whose paths are shown, in the flange; None: the one of the calibration.
         remarks: what the guards say.
+        looked_in: the cell in which collisions were looked for; None: nowhere.
     """
 
     q_meant: Array
@@ -76,6 +77,7 @@ class ShownPath:
     labels: tuple[str, ...] = ()
     X_FT: Array | None = None
     remarks: tuple[Remark, ...] = ()
+    looked_in: str | None = None
 
     @classmethod
     def of_joints(cls, q_programmed: Array, q_corrected: Array, labels: Sequence[str] | None = None) -> ShownPath:
@@ -134,6 +136,7 @@ class ShownPath:
             labels if written else (),
             _only_tool(controller.X_F0 @ motions.X_0T[target]),
             _remarks(rewritten, line),
+            rewritten.cell,
         )
 
     def outside(self, region: Region) -> Array:

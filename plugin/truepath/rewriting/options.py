@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from truepath.posed_cell import Surroundings
 
 PATH_TOLERANCE_MM = 0.05
+NOWHERE = "none"
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class RewriteOptions:
         path_tolerance_mm: how far the tool may leave the straight line or arc between two targets before a target is
             added on the way; None: nothing is added.
         max_correction_mm: no target may move further.
-        cell: model of the cell in which collisions are looked for; None: nowhere.
+        cell: model of the cell in which collisions are looked for; None or ``none``: nowhere. In a host None leaves the
+            choice to it (``CalibrationPlugin.correct``: its own plant), and ``none`` means nowhere there too.
         surroundings: the same in memory, as a host has it; it takes the place of ``cell``.
         start_rad: joints from which the program starts, where its first target is a pose.
         tool: TCP in force before the program sets one: position in m, rotation vector in rad, on the tool flange.
@@ -41,3 +43,10 @@ class RewriteOptions:
     start_rad: tuple[float, ...] | None = None
     tool: tuple[float, ...] | None = None
     max_age_days: int = MAX_AGE_DAYS
+
+    @property
+    def looks_in(self) -> str | Surroundings | None:
+        """Where collisions are looked for; None: nowhere."""
+        if self.surroundings is not None:
+            return self.surroundings
+        return None if self.cell == NOWHERE else self.cell

@@ -15,6 +15,7 @@ from truepath.calibration import Calibration
 from truepath.controller import Controller, controller_of
 from truepath.correct import Correction, correct
 from truepath.errors import CorrectionError
+from truepath.files import write_atomically
 from truepath.guards import Finding, calibration_findings, condense
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
@@ -61,6 +62,24 @@ class RewrittenProgram:
     unresolved: tuple[Unresolved, ...]
     findings: tuple[Finding, ...] = field(default=())
     cell: str | None = None
+
+    def __repr__(self) -> str:
+        total, cell = len(self.plan) + len(self.unresolved), "no cell" if self.cell is None else self.cell
+        return (
+            f"<RewrittenProgram {self.file}: {len(self.plan)} of {total} targets corrected, "
+            f"{len(self.warnings)} warnings, looked for collisions in {cell}>"
+        )
+
+    def write(self, path: str | Path) -> None:
+        """Writes the corrected program, as a whole or not at all.
+
+        Raises:
+            InputError: it would be written over the program that was read; a place that cannot be written to.
+        """
+        from truepath.pipeline import keep
+
+        keep(Path(path), Path(self.file))
+        write_atomically(path, self.content)
 
     def summary(self) -> dict[str, Any]:
         """What a machine wants to know, as plain JSON types."""
@@ -170,7 +189,7 @@ def rewrite(
         *doubtful_findings(
             plan, motions.possible, X_end, model, controller, tolerance_mm, options.max_correction_mm, file
         ),
-        *watch(plan, correction.q_rad, ways, calibration, options.surroundings or options.cell),
+        *watch(plan, correction.q_rad, ways, calibration, options.looks_in),
     ]
     _refuse(findings, file)
     say("writing")
@@ -194,7 +213,7 @@ def rewrite(
         vias=vias,
         unresolved=tuple(sorted([*program.unresolved, *_without_posture(program, plan)], key=lambda each: each.line)),
         findings=tuple(findings),
-        cell=options.cell if options.surroundings is None else str(options.surroundings),
+        cell=None if options.looks_in is None else str(options.looks_in),
     )
 
 

@@ -87,10 +87,12 @@ class CorrectedTrajectory:
     @property
     def warnings(self) -> list[str]:
         """Plain sentences, one for each kind of thing."""
-        return [
-            *(_at_times(each, self.time_s) for each in self.rewritten.correction.warnings),
-            *condense(self.findings),
-        ]
+        return [*self.correction_warnings, *condense(self.findings)]
+
+    @property
+    def correction_warnings(self) -> list[str]:
+        """Those of the correction itself, with times."""
+        return [_at_times(each, self.time_s) for each in self.rewritten.correction.warnings]
 
 
 def correct_trajectory(

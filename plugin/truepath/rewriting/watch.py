@@ -84,7 +84,7 @@ def _room(
     plan: Plan, q_corrected_rad: Array, ways: Ways, calibration: Calibration, cell: str | Surroundings
 ) -> list[Finding]:
     from truepath.clearance import Cell
-    from truepath.closer import clearance_findings, compare
+    from truepath.closer import clearance_findings, collide_all_along, compare, driven_findings
 
     along = along_the_program(plan, q_corrected_rad, ways)
     real = Cell(cell, calibration.model)
@@ -96,7 +96,8 @@ def _room(
         model = calibration.model
         drawn = Cell(cell, nominal_model(model.robot, model.X_MB_nominal, model.X_FE_nominal))
         places = compare(today, then, drawn.clearances(along.q_today_rad))
-    return clearance_findings(places, along.line)
+    driven = collide_all_along(today, then, along.line)
+    return [*clearance_findings(places, along.line, driven=driven), *driven_findings(driven, along.line)]
 
 
 @dataclass(frozen=True, eq=False)
