@@ -24,6 +24,22 @@ settings.load_profile("truepath")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# A file goes to one worker as a whole: those that take longest first, so that nobody waits for one at the end.
+LONGEST_FIRST = (
+    "test_readme.py",
+    "test_closed_loop_workflow.py",
+    "test_docs.py",
+    "test_hidden_effects.py",
+    "test_cell_workflow.py",
+    "test_benchmark.py",
+)
+
+
+def pytest_collection_modifyitems(items):
+    places = {name: number for number, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
+
+
 # Seven joints about axes in mixed directions (some not of unit length), turned joint frames, fixed joints
 # between moving ones, a load beside the chain, and a base that is neither upright nor at the origin.
 SEVEN_JOINT_URDF = """<?xml version="1.0"?>

@@ -8,7 +8,7 @@ import truepath
 from hypothesis import given
 from hypothesis import strategies as st
 from truepath.errors import InputError
-from truepath.stamp import Stamp, find_stamp, refuse_if_stamped
+from truepath.stamp import Stamp, body_sha256, find_stamp, refuse_if_stamped, sealed
 
 STAMP = Stamp("0.3.0", "0f" * 32, "a1" * 32, date(2026, 11, 22))
 LINE = f"# truepath-corrected version=0.3.0 program-sha256={'0f' * 32} calibration-sha256={'a1' * 32} date=2026-11-22"
@@ -18,6 +18,26 @@ PROGRAM = 'def weld():\n  movej([0, 1, 2, 3, 4, 5])\n  textmsg("done # not yet")
 def test_the_line_is_what_is_documented():
     assert STAMP.line("#") == LINE
     assert STAMP.line("//") == "//" + LINE[1:]
+    with_body = LINE.replace(" date", f" body-sha256={'5c' * 32} date")
+    assert find_stamp(with_body, "p", "#")[0].body_sha256 == "5c" * 32
+    assert find_stamp(with_body, "p", "#")[0].line("#") == with_body
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("before", ["", "\ufeff", "# a plate@"])
+def test_a_sealed_program_has_the_hash_of_all_but_the_line_of_its_stamp(end, before):
+    before, body = (text.replace("@", end) for text in (before, "def weld():@  movej(q)@end"))
+    content = sealed(f"{before}{LINE}{end}{body}".encode(), STAMP, "#")
+    stamp, line = find_stamp(content.decode(), "p", "#")
+    others = f"{before}{body}".removeprefix("\ufeff").encode()  # a byte order mark stands in the first line
+    assert stamp.body_sha256 == body_sha256(content, line) == hashlib.sha256(others).hexdigest()
+    assert body_sha256(content.replace(b"movej", b"movel"), line) != stamp.body_sha256
+    assert body_sha256(content + b" ", line) != stamp.body_sha256
+    assert content.replace(f" body-sha256={stamp.body_sha256}".encode(), b"") == f"{before}{LINE}{end}{body}".encode()
+
+
+def test_a_format_that_writes_no_stamp_stays_as_it_is():
+    assert sealed(PROGRAM.encode(), STAMP, "#") == PROGRAM.encode()
 
 
 def test_a_stamp_hashes_both_files():

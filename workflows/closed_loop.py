@@ -162,7 +162,8 @@ class Loop:
     def _record(self, poses: str, output: str) -> None:
         host = ("--robot-host", self.options.address, "--tracker", "simulated", "--robot", CELL)
         pace = ("--speed-deg", 60, "--acceleration-deg", 120, "--settle-s", 0.05, "--measure-s", 0.1)
-        self._truepath("record", poses, *host, *pace, "-o", output, "--yes")
+        anywhere = ("--yes", "--first-move-deg", 360)  # nothing stands in the way of a virtual robot
+        self._truepath("record", poses, *host, *pace, "-o", output, *anywhere)
 
     def _visit(self, q_rad: Array, name: str) -> None:
         """Measures the targets of a program, each a few times, one round after the other."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import signal
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -36,6 +35,9 @@ def deploy(
     uncorrected: Annotated[
         bool, typer.Option("--uncorrected", help="allow a program that was not corrected with this calibration")
     ] = False,
+    unrehearsed: Annotated[
+        bool, typer.Option("--unrehearsed", help="allow a program of which nobody knows where it goes first")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="look at everything, move nothing")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="move without asking first")] = False,
     json: Json = False,
@@ -45,27 +47,34 @@ def deploy(
     Nothing moves unless safety, payload, TCP, posture and the program's stamp are as the calibration needs them.
     Ctrl-C stops the robot.
     """
-    from truepath import console
-    from truepath.calibration import load_calibration
-    from truepath.deploying.deploy import DeployOptions, NotReady, prepare
-    from truepath.deploying.printed import print_outcome, print_prepared
-    from truepath.pipeline import keep, require_place
-    from truepath.rewriting.stated import stated_options
-    from truepath.robot_link import RobotFault, RobotLink
+    from truepath.robot_link.interruptions import ending_at_once, interruptible
 
-    if not (yes or dry_run or sys.stdin.isatty()):
-        raise InputError("nobody is there to ask whether the robot may move", expected="a terminal, or --yes")
-    if record is not None:
-        keep(record, program, calibration)
-        require_place(record)
-    loaded = load_calibration(calibration).carrying(payload_kg)
-    stated = stated_options(loaded, None, controller_kinematics, None, 0.0, "none", start_deg, tcp)
-    options = DeployOptions(
-        uncorrected, controller_kinematics, stated.tool, stated.start_rad, math.radians(start_within_deg)
-    )
-    signal.signal(signal.SIGTERM, _interrupt)
+    with ending_at_once():
+        from truepath import console
+        from truepath.calibration import load_calibration
+        from truepath.deploying.deploy import DeployOptions, NotReady, prepare
+        from truepath.deploying.printed import print_outcome, print_prepared
+        from truepath.pipeline import keep, require_place
+        from truepath.rewriting.stated import stated_options
+        from truepath.robot_link import RobotFault, RobotLink
+
+        if not (yes or dry_run or sys.stdin.isatty()):
+            raise InputError("nobody is there to ask whether the robot may move", expected="a terminal, or --yes")
+        if record is not None:
+            keep(record, program, calibration)
+            require_place(record)
+        loaded = load_calibration(calibration).carrying(payload_kg)
+        stated = stated_options(loaded, None, controller_kinematics, None, 0.0, "none", start_deg, tcp)
+        options = DeployOptions(
+            uncorrected,
+            unrehearsed,
+            controller_kinematics,
+            stated.tool,
+            stated.start_rad,
+            math.radians(start_within_deg),
+        )
     try:
-        with RobotLink(robot_host, options.timeout_s) as link:
+        with interruptible(), RobotLink(robot_host, options.timeout_s) as link:
             with console.progress("looking at program and robot"):
                 prepared = prepare(program, loaded, link, options)
             if not json:
@@ -126,7 +135,3 @@ def _say_dry(prepared: Prepared, json: bool) -> None:
         console.print_json({"schema": "truepath.deployment/1", **content})
     else:
         console.out.print("nothing was moved (--dry-run)")
-
-
-def _interrupt(number: int, frame: Any) -> NoReturn:
-    raise KeyboardInterrupt

@@ -2,14 +2,18 @@
 
 One line of the program, nothing but a comment. Behind the comment sign, which is the format's own:
 
-    truepath-corrected version=0.3.0 program-sha256=<64 hex> calibration-sha256=<64 hex> date=2026-11-22
+    truepath-corrected version=0.6.0 program-sha256=<64 hex> calibration-sha256=<64 hex> body-sha256=<64 hex>
+    date=2026-11-22
+
+(one line). ``body-sha256`` is that of the corrected program without its stamp: who runs it sees whether it was changed
+since. Earlier versions wrote none. It guards against mistakes, not against somebody who computes it anew.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
@@ -17,12 +21,13 @@ import truepath
 from truepath.errors import InputError
 
 MARK = "truepath-corrected"
-FORM = f"{MARK} version=... program-sha256=<64 hex> calibration-sha256=<64 hex> date=YYYY-MM-DD"
+FORM = f"{MARK} version=... program-sha256=<64 hex> calibration-sha256=<64 hex> body-sha256=<64 hex> date=YYYY-MM-DD"
 _CONTENT = re.compile(
     rf"{MARK} version=([0-9A-Za-z.+-]{{1,40}}) program-sha256=([0-9a-f]{{64}}) calibration-sha256=([0-9a-f]{{64}}) "
-    r"date=([0-9]{4}-[0-9]{2}-[0-9]{2})"
+    r"(?:body-sha256=([0-9a-f]{64}) )?date=([0-9]{4}-[0-9]{2}-[0-9]{2})"
 )
 _LINE_END = re.compile(r"\r\n|\r|\n")  # not those of splitlines(): a form feed or U+2028 may stand in a string
+_LINE_END_BYTES = re.compile(b"(%b)" % _LINE_END.pattern.encode())
 
 
 @dataclass(frozen=True)
@@ -34,12 +39,14 @@ class Stamp:
         program_sha256: of the program before it was corrected, as bytes.
         calibration_sha256: of the calibration file, as bytes.
         day: of the correction.
+        body_sha256: of the corrected program without the line of the stamp, as bytes; None from earlier versions.
     """
 
     version: str
     program_sha256: str
     calibration_sha256: str
     day: date
+    body_sha256: str | None = None
 
     @classmethod
     def of(cls, program: bytes, calibration: bytes, day: date) -> Stamp:
@@ -49,10 +56,31 @@ class Stamp:
 
     def line(self, comment: str) -> str:
         """The line, without its end, behind a format's comment sign ("#" in URScript)."""
+        body = "" if self.body_sha256 is None else f"body-sha256={self.body_sha256} "
         return (
             f"{comment} {MARK} version={self.version} program-sha256={self.program_sha256} "
-            f"calibration-sha256={self.calibration_sha256} date={self.day.isoformat()}"
+            f"calibration-sha256={self.calibration_sha256} {body}date={self.day.isoformat()}"
         )
+
+
+def sealed(content: bytes, stamp: Stamp, comment: str) -> bytes:
+    """A corrected program that bears this stamp, now with the hash of its body in it.
+
+    A format that did not write the stamp as it was given gets its content back.
+    """
+    plain = stamp.line(comment).encode()
+    before, found, after = content.partition(plain)
+    if not found:
+        return content
+    line = 1 + len(_LINE_END_BYTES.findall(before))
+    return before + replace(stamp, body_sha256=body_sha256(content, line)).line(comment).encode() + after
+
+
+def body_sha256(content: bytes, line: int) -> str:
+    """Hash of a program without one line, from 1, and its end; all other bytes count, line ends as they are."""
+    pieces = _LINE_END_BYTES.split(content)  # lines and their ends in turns
+    del pieces[2 * line - 2 : 2 * line]
+    return hashlib.sha256(b"".join(pieces)).hexdigest()
 
 
 def find_stamp(text: str, file: str | Path, comment: str) -> tuple[Stamp, int] | None:
@@ -106,7 +134,7 @@ def _parse(content: str, file: str | Path, line: int) -> Stamp:
     match = _CONTENT.fullmatch(content)
     try:
         if match:
-            return Stamp(match[1], match[2], match[3], date.fromisoformat(match[4]))
+            return Stamp(match[1], match[2], match[3], date.fromisoformat(match[5]), match[4])
     except ValueError:  # a day that no calendar has
         pass
     raise InputError(

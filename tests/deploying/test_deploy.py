@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from command import is_refused
+from controller_settings import setting
 from truepath import plants
 from truepath.controller import controller_of, vectors_from_poses
 from truepath.deploying.deploy import DeployOptions, NotReady, prepare, run
@@ -60,14 +61,6 @@ class Onlooker:
         away = [np.abs(np.subtract(q, q_rad)).max() for q, _ in self.seen]
         assert min(away) < 1e-5, "the arm was never there"
         return self.seen[int(np.argmin(away))][1]
-
-
-def setting(controller, link, **values):
-    """Changes the controller, and waits until the link has seen it."""
-    controller.command({"do": "set", **values})
-    now_s = controller.command({"do": "state"})["time_s"]
-    while link.state().time_s <= now_s:
-        time.sleep(0.01)
 
 
 def refusal(controller, weld, calibration, link, **options):

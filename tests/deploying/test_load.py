@@ -37,6 +37,7 @@ def test_a_payload_beyond_the_model_sits_on_the_flange(calibration, drawn):
         (0.86, None, True),
         (1.60, [0.030, 0.0, 0.036], False),
         (0.0, [0.0, 0.0, 0.0], False),
+        (float("nan"), None, False),
         (1.03, [0.030, 0.0, 0.136], False),
     ],
 )

@@ -47,6 +47,14 @@ def test_what_a_sensor_decides_stays_open(controller):
     assert "get_standard_digital_in" in rehearsal.open_end
 
 
+def test_where_joints_go_by_speed_nobody_knows_and_a_stop_is_no_speed(controller):
+    home, away = "movej([0,-1,1,-1,-1,0])", "movej([1,-1,1,-1,-1,0])"
+    rehearsal = rehearse(f"{home}\nspeedj([0.5,0,0,0,0,0], 1.4, 2.0)\n{away}\n", controller, HOME, NO_TOOL)
+    assert len(rehearsal) == 1
+    assert "line 2 moves the joints by speed" in rehearsal.open_end
+    assert len(rehearse(f"{home}\nstopj(2.0)\n{away}\n", controller, HOME, NO_TOOL)) == 2
+
+
 def test_a_program_that_never_ends_is_followed_for_a_while(controller):
     rehearsal = rehearse("while True:\nmovej([0,-1,1,-1,-1,0])\nsync()\nend\n", controller, HOME, NO_TOOL)
     assert rehearsal.open_end == "it goes on and on"

@@ -1,5 +1,7 @@
 """The program that is sent: what is refused before anybody asks the robot."""
 
+import re
+
 import pytest
 from truepath.deploying.sent_program import read_program, require_correction, robot_remarks
 from truepath.errors import InputError
@@ -64,6 +66,25 @@ def test_a_program_that_was_not_corrected_is_refused(script, calibration):
 def test_one_that_was_corrected_with_another_calibration_is_refused(weld, calibration):
     with pytest.raises(InputError, match="another calibration"):
         require_correction(read_program(weld), calibration.carrying(2.5))
+
+
+def test_one_that_was_changed_after_its_correction_is_refused(weld, script, calibration):
+    written = weld.read_bytes()
+    for changed in (
+        written.replace(b"v=0.25", b"v=2.25", 1),
+        written.replace(b"\n", b"\r\n"),
+        written.splitlines(keepends=True)[0] + f"def a():\n{MOVE}\nend\n".encode(),
+    ):
+        assert changed != written
+        with pytest.raises(InputError, match="changed after it was corrected"):
+            require_correction(read_program(script(changed)), calibration)
+
+
+def test_one_whose_stamp_does_not_tell_whether_it_was_changed_is_refused(weld, script, calibration):
+    earlier = re.sub(rb"body-sha256=[0-9a-f]{64} ", b"", weld.read_bytes())
+    with pytest.raises(InputError, match="by an earlier version") as error:
+        require_correction(read_program(script(earlier)), calibration)
+    assert "corrected again" in error.value.expected
 
 
 def test_one_for_another_robot_is_refused(script, calibration):

@@ -1,6 +1,15 @@
+import gc
+
 import pytest
 from foreign_host import RealCell, build_plant, calibrated, plugin_for
 from live_host import Browser, make_host, start_meshcat
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _nothing_of_drake_is_left():
+    """Drake's Meshcat must die on the thread that made it; garbage is also collected on the threads of later tests."""
+    yield
+    gc.collect()
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from truepath.errors import InputError
-from truepath.planning.pose_list import PoseList, read_pose_list, to_csv
+from truepath.planning.pose_list import PoseList, read_pose_list, robot_mark, to_csv
+from truepath.plants import load_robot
 
 JOINTS = ",".join(f"q{i}_rad" for i in range(1, 7))
 
@@ -80,3 +81,20 @@ def test_a_fault_is_told_with_its_place(tmp_path, text, line, column):
 def test_a_list_in_which_nothing_is_measured_is_refused(tmp_path):
     with pytest.raises(InputError, match="nothing is to be measured"):
         read(tmp_path, f"measure,{JOINTS}\n0,{row()}\n")
+
+
+def test_the_robot_that_was_planned_for_comes_back():
+    mark = robot_mark(load_robot("ur5"))
+    assert mark.startswith("ur5:")
+    assert mark != robot_mark(load_robot("ur10"))
+    text = to_csv(PoseList(np.zeros((2, 6)), np.array([False, True]), np.array([-1, 4]), mark))
+    assert text.splitlines()[0] == "pose_id,measure," + JOINTS + ",robot"
+
+
+def test_the_robot_is_read_and_must_be_one(tmp_path):
+    mark = "ur5:0123456789ab"
+    assert read(tmp_path, f"{JOINTS},robot\n{row()},{mark}\n{row(1)},{mark}\n").robot == mark
+    with pytest.raises(InputError, match="two robots"):
+        read(tmp_path, f"{JOINTS},robot\n{row()},{mark}\n{row(1)},ur10:0123456789ab\n")
+    with pytest.raises(InputError, match="names no robot"):
+        read(tmp_path, f"{JOINTS},robot\n{row()},\n")

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from truepath.model import nominal_model
+from truepath.plants import load_robot
 from truepath.recording.campaign import Campaign
 from truepath.recording.manner import Manner
 from truepath.recording.readings import BeamBroken, Reading
@@ -10,6 +12,8 @@ from truepath.recording.visit import columns
 from truepath.robot_link import RobotFault, RobotLink
 
 BRISK = Manner(60.0, 200.0, settle_s=0.05, measure_s=0.05, tries=2, between_tries_s=0.05)
+ROBOT = load_robot("ur5_cell")
+FLANGE = nominal_model(ROBOT)
 
 
 class Spy:
@@ -25,7 +29,12 @@ class Spy:
         spread_mm = self._sees(len(self.asked_at) - 1)
         if spread_mm is None:
             raise BeamBroken("something stands in the way")
-        return Reading(np.zeros(3), None, spread_mm, 10, 0.0)
+        # Seen from the base, at the flange, with the noise without which a reading is a copy.
+        p_BF = FLANGE.predict(self.asked_at[-1][None])[0, :3, 3]
+        return Reading(p_BF + 1e-5 * np.sin(len(self.asked_at)), None, spread_mm, 10, 0.0)
+
+    def seen_since(self, start_s):
+        return [(start_s, None)]
 
     def close(self):
         pass
@@ -44,7 +53,7 @@ def run(link, at_home, poses, tmp_path):
     def run(sees):
         spy = Spy(link, sees)
         with RowFile(tmp_path / "data.csv", poses[0], "00", columns(6, False), resume=True) as rows:
-            campaign = Campaign(link, spy, poses[0], rows, 0.0, BRISK)
+            campaign = Campaign(link, spy, poses[0], rows, ROBOT, 0.0, BRISK)
             try:
                 outcome = campaign.run()
             except RobotFault as fault:

@@ -1,6 +1,7 @@
 """Rows on the disk: what is there stays, half of a line goes, nothing is taken for what it is not."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from truepath.errors import InputError
 from truepath.lie import from_rotation_vector
 from truepath.measurements import from_table
 from truepath.planning.pose_list import PoseList
+from truepath.recording.circumstances import Circumstances
 from truepath.recording.readings import Reading
 from truepath.recording.row_file import RowFile, progress_file
 from truepath.recording.visit import Visit, cells, columns
@@ -146,3 +148,39 @@ def test_time_goes_on_from_the_last_row_even_if_the_clock_was_set_back(data):
     progress_file(data).write_text(json.dumps(side | {"began_unix_s": side["began_unix_s"] + 1e6}))
     with opened(data, resume=True) as rows:
         assert rows.time_s() == 20.0
+
+
+UNDER = Circumstances("ab" * 32, 1.03, "simulated", "20240000001")
+
+
+def under(path, circumstances, resume=True):
+    return RowFile(path, POSES, HASH, HEADER, resume=resume, circumstances=circumstances)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("model_sha256", "cd" * 32), ("payload_kg", 3.0), ("tracker", "tcp:a:1"), ("serial_number", "20240000002")],
+)
+def test_a_recording_does_not_go_on_under_other_circumstances(tmp_path, name, value):
+    path = tmp_path / "data.csv"
+    with under(path, UNDER, resume=False) as rows:
+        rows.append(0, cells(visit_of(0)))
+    with under(path, replace(UNDER, payload_kg=1.031)) as rows:
+        assert rows.done == {0}
+    with pytest.raises(InputError, match="other circumstances") as error:
+        under(path, replace(UNDER, **{name: value}))
+    assert error.value.column == name
+
+
+def test_a_recording_that_tells_no_circumstances_goes_on(data):
+    content = json.loads(progress_file(data).read_text())
+    del content["circumstances"]
+    progress_file(data).write_text(json.dumps(content))
+    with under(data, UNDER) as rows:
+        assert rows.done == {0, 2}
+
+
+def test_a_file_without_a_row_is_taken_away(tmp_path):
+    with opened(tmp_path / "data.csv"):
+        pass
+    assert list(tmp_path.iterdir()) == []

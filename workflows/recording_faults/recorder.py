@@ -23,6 +23,7 @@ class Recorder:
         self._command = [
             *(sys.executable, "-c", "from truepath.cli import main; main()", "record", str(folder / "poses.csv")),
             *("--robot-host", address, "--tracker", "simulated", "-o", str(folder / "data.csv"), "--yes"),
+            *("--first-move-deg", "360"),  # nothing stands in the way of a virtual robot
             *("--settle-s", "0.1", "--measure-s", "0.1", "--speed-deg", "40", "--acceleration-deg", "120"),
         ]
         self._log = folder / "log.txt"

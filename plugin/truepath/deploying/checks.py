@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from truepath import lie
+from truepath.controller import Controller, vectors_from_poses
 from truepath.deploying.load import Load
-from truepath.deploying.rehearsal import Rehearsal
 from truepath.lie import Array
 from truepath.robot import NominalRobot
 from truepath.robot_link import RobotFault, RobotLink, RobotState
-from truepath.robot_link.readiness import MODES
+from truepath.robot_link.readiness import MODES, is_in_remote_control
 from truepath.robot_link.state import RUNNING_MODE
+from truepath.virtual.controller.script_instructions import SetPayload
 from truepath.virtual.controller.script_values import matrix
 
 TCP_TOLERANCE_M, TCP_TOLERANCE_RAD = 2e-4, 2e-3
-REMOTE = {"true": True, "false": False}
+# A controller knows its arm as measured in the factory: some mm from the published one. Two types are 50 mm apart.
+ANOTHER_ROBOT_M, ANOTHER_ROBOT_RAD = 0.02, 0.1
+MOVED_RAD = 1e-3
 
 
 def robot_obstacles(link: RobotLink) -> tuple[RobotState, list[str], list[str]]:
@@ -34,9 +38,11 @@ def robot_obstacles(link: RobotLink) -> tuple[RobotState, list[str], list[str]]:
         found.append(f"robot mode is {MODES.get(state.robot_mode, state.robot_mode)}, not running")
     if state.program_running:
         found.append("a program is running on the robot")
-    if (np.abs(state.speed_rad_s) > 0.01).any():
+    if not (np.abs(state.speed_rad_s) <= 0.01).all():  # a NaN is no robot that stands
         found.append("the robot is moving")
-    remote = _is_in_remote_control(link)
+    if not np.isfinite([state.q_rad, state.tcp_pose]).all():
+        found.append("the controller does not tell its joints and its tool in numbers")
+    remote = is_in_remote_control(link)
     if remote is False:
         found.append("the robot is in local control: switch to remote control on the teach pendant")
     elif remote is None:
@@ -44,40 +50,77 @@ def robot_obstacles(link: RobotLink) -> tuple[RobotState, list[str], list[str]]:
     return state, found, unknown
 
 
-def _is_in_remote_control(link: RobotLink) -> bool | None:
-    """None from a controller that does not know the question, as CB3 does not."""
+def moved_obstacles(state: RobotState, q_rad: Array) -> list[str]:
+    """Whether the robot stands where it stood, ``(6,)``."""
+    if (np.abs(state.q_rad - q_rad) <= MOVED_RAD).all():
+        return []
+    return ["the robot was moved since it was checked"]
+
+
+def another_robot_obstacles(controller: Controller, name: str, state: RobotState, tcp: Array, told: str) -> list[str]:
+    """Whether the connected robot is built as the calibrated one: where its controller has the tool at its joints.
+
+    Args:
+        controller: of the calibrated robot.
+        name: of that robot.
+        state: of the connected one.
+        tcp: X_0T on its controller, ``(6,)``.
+        told: what its dashboard says that it is, or nothing.
+    """
+    wanted = controller.tool_poses(state.q_rad[None], matrix(tcp))[0]
+    off = lie.pose_error(matrix(state.tcp_pose), wanted)
+    angle, distance = np.linalg.norm(off[:3]), np.linalg.norm(off[3:])
+    if distance <= ANOTHER_ROBOT_M and angle <= ANOTHER_ROBOT_RAD:
+        return []
+    itself = f" It says that it is a {told}." if told else ""
+    return [
+        f"this is not a {name}: at its joints the controller has the tool at {_shown(state.tcp_pose)}, a {name} at "
+        f"{_shown(vectors_from_poses(wanted[None])[0])}: {1e3 * distance:.0f} mm and {np.degrees(angle):.1f} deg "
+        f"apart.{itself}"
+    ]
+
+
+def model_told(link: RobotLink) -> str:
+    """What the dashboard calls the robot; nothing if it does not know the question."""
     try:
-        return REMOTE.get(link.dashboard("is in remote control").strip().lower())
+        answer = link.dashboard("get robot model").strip()
     except RobotFault:
-        return None
+        return ""
+    return answer if re.fullmatch(r"[A-Za-z0-9 ]{1,20}", answer) else ""
 
 
 def payload_obstacles(
-    calibrated: Load | None, state: RobotState, rehearsal: Rehearsal
+    calibrated: Load | None, state: RobotState, payloads: Sequence[SetPayload]
 ) -> tuple[list[str], list[str], list[str]]:
-    """What is wrong with the payload on the controller, in the program, and what cannot be told.
+    """What is wrong with the payload on the controller, in the program, and remarks.
 
     Args:
         calibrated: what the calibration was made with; None if it cannot be told from the arm.
+        payloads: that the program sets.
     """
-    stated = [
-        Load(each.mass_kg, None if each.centre_m is None else np.array(each.centre_m)) for each in rehearsal.payloads
-    ]
+    stated = [Load(each.mass_kg, None if each.centre_m is None else np.array(each.centre_m)) for each in payloads]
     on_robot = None if state.payload_kg is None else Load(state.payload_kg, state.payload_cog_m)
-    unknown = [] if on_robot else ["the controller does not tell its payload"]
+    remarks = [] if on_robot else ["the controller does not tell its payload"]
     wanted, whose = calibrated, "the calibration is for"
     if wanted is None:
         wanted, whose = (stated[0] if stated else None), "the program states"
-        unknown.append("the payload cannot be compared with the calibration: its bare arm is not known")
+        remarks.append("the payload cannot be compared with the calibration: its bare arm is not known")
     if wanted is None:
-        return [], [], unknown
-    robot = [f"the controller is set to a payload of {on_robot}, {whose} {wanted}"]
-    program = [
-        f"line {each.line} sets a payload of {load}, {whose} {wanted}"
-        for each, load in zip(rehearsal.payloads, stated, strict=True)
-        if not load.is_like(wanted)
-    ]
-    return robot if on_robot and not on_robot.is_like(wanted) else [], program, unknown
+        return [], [], remarks
+    robot, program = [], []
+    if on_robot:
+        said = f"the controller is set to a payload of {on_robot}, {whose} {wanted}"
+        if not on_robot.is_like(wanted):
+            robot.append(said)
+        elif on_robot.is_a_little_other(wanted):
+            remarks.append(said)
+    for each, load in zip(payloads, stated, strict=True):
+        said = f"line {each.line} sets a payload of {load}, {whose} {wanted}"
+        if not load.is_like(wanted):
+            program.append(said)
+        elif load.is_a_little_other(wanted):
+            remarks.append(said)
+    return robot, program, remarks
 
 
 def tcp_obstacles(tcp: Array, corrected_for: Array) -> list[str]:

@@ -12,14 +12,23 @@ import numpy as np
 
 from truepath.calibration import Calibration
 from truepath.controller import Controller, controller_of, vectors_from_poses
-from truepath.deploying.checks import payload_obstacles, robot_obstacles, start_obstacles, tcp_obstacles
+from truepath.deploying.checks import (
+    another_robot_obstacles,
+    model_told,
+    moved_obstacles,
+    payload_obstacles,
+    robot_obstacles,
+    start_obstacles,
+    tcp_obstacles,
+)
 from truepath.deploying.follow import Followed, Watched, send_and_follow
-from truepath.deploying.load import calibrated_load
+from truepath.deploying.load import Load, calibrated_load
 from truepath.deploying.outcome import Outcome, outcome_of
 from truepath.deploying.passages import Passages
 from truepath.deploying.rehearsal import Rehearsal, rehearse
 from truepath.deploying.run_file import RunFile
 from truepath.deploying.sent_program import SentProgram, read_program, require_correction, robot_remarks
+from truepath.deploying.settings import Settings, settings_in
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.robot_link import RobotFault, RobotLink, RobotState
@@ -37,6 +46,7 @@ class DeployOptions:
 
     Attributes:
         uncorrected: a program without the stamp of this calibration is allowed.
+        unrehearsed: a program is allowed of which nobody knows where it goes first.
         controller_kinematics: see ``controller.controller_of``.
         tool: TCP that the correction was made for where the program sets none, ``(6,)`` in m and rad; None: no tool.
         start_rad: joints from which the program is meant to start; None: at its first target.
@@ -45,6 +55,7 @@ class DeployOptions:
     """
 
     uncorrected: bool = False
+    unrehearsed: bool = False
     controller_kinematics: str = "nominal"
     tool: tuple[float, ...] | None = None
     start_rad: tuple[float, ...] | None = None
@@ -59,6 +70,8 @@ class Prepared:
     Attributes:
         program, rehearsal: what will be run.
         calibration, controller: of the robot.
+        load: what the robot must carry; None if it cannot be told.
+        tool: X_0T that must be set on the controller, ``(6,)``; None if it does not matter.
         state: of the robot when it was checked.
         remarks: what a person should know.
     """
@@ -67,6 +80,8 @@ class Prepared:
     rehearsal: Rehearsal
     calibration: Calibration
     controller: Controller
+    load: Load | None
+    tool: Array | None
     state: RobotState
     remarks: tuple[str, ...]
 
@@ -117,11 +132,13 @@ def prepare(path: str | Path, calibration: Calibration, link: RobotLink, options
         from_here = rehearsal if options.start_rad is None else rehearse(program.text, controller, state.q_rad, tool)
     except ScriptError as error:
         raise InputError(error.reason, file=program.file, line=error.line) from None
+    settings = Settings() if rehearsal.open_end is None else settings_in(program.text)
+    _require_first_target(rehearsal, program, options)
     _require_posture(rehearsal, program, options)
     _require_reach(rehearsal, calibration, program)
-    payload_on_robot, payload_in_program, untold = payload_obstacles(
-        calibrated_load(calibration, controller), state, rehearsal
-    )
+    load = calibrated_load(calibration, controller)
+    payloads = dict.fromkeys((*rehearsal.payloads, *settings.payloads))
+    payload_on_robot, payload_in_program, untold = payload_obstacles(load, state, [*payloads])
     if payload_in_program:
         raise InputError("; ".join(payload_in_program), file=program.file)
     obstacles += payload_on_robot
@@ -129,19 +146,23 @@ def prepare(path: str | Path, calibration: Calibration, link: RobotLink, options
         obstacles += start_obstacles(robot, state.q_rad, start, options.start_within_rad, None)
         if (
             rehearsal.q_rad.shape != from_here.q_rad.shape
-            or np.abs(rehearsal.q_rad - from_here.q_rad).max(initial=0.0) > SAME_RAD
+            or not np.abs(rehearsal.q_rad - from_here.q_rad).max(initial=0.0) <= SAME_RAD
         ):
             obstacles.append("from where the robot stands it would take other postures than from the start stated")
     if len(rehearsal):
         goal, line = rehearsal.q_rad[0], int(rehearsal.line[0])
         obstacles += start_obstacles(robot, state.q_rad, goal, options.start_within_rad, line)
-    if rehearsal.depends_on_tool and not obstacles:  # last, because to ask takes a program on the controller
-        obstacles += tcp_obstacles(_tcp_of(link), vectors_from_poses(rehearsal.X_0T[0]))
+    wanted_tool = _tool_of(rehearsal, settings, options)
+    if not obstacles:  # last, because to ask takes a program on the controller
+        tcp = _tcp_of(link)
+        obstacles += another_robot_obstacles(controller, calibration.robot.name, state, tcp, model_told(link))
+        if wanted_tool is not None and not obstacles:
+            obstacles += tcp_obstacles(tcp, wanted_tool)
     if obstacles:
         raise NotReady(obstacles)
-    if rehearsal.open_end is not None:
-        untold.append(f"only the first {len(rehearsal)} targets are known: {rehearsal.open_end}")
-    return Prepared(program, rehearsal, calibration, controller, state, (*remarks, *unknown, *untold))
+    untold += _open_end_remarks(rehearsal, settings)
+    remarks += (*unknown, *untold)
+    return Prepared(program, rehearsal, calibration, controller, load, wanted_tool, state, tuple(remarks))
 
 
 def run(prepared: Prepared, link: RobotLink, record: Path | None, watched: Watched) -> Outcome:
@@ -153,27 +174,79 @@ def run(prepared: Prepared, link: RobotLink, record: Path | None, watched: Watch
     """
     rehearsal = prepared.rehearsal
     passages = Passages(rehearsal.q_rad, rehearsal.blend_m)
-    with RunFile(record) as rows:
-        state, obstacles, _ = robot_obstacles(link)  # somebody may have come near while the question was open
-        if np.abs(state.q_rad - prepared.state.q_rad).max() > 1e-3:
-            obstacles.append("the robot was moved since it was checked")
-        if obstacles:
-            raise NotReady(obstacles)
+    _require_still_ready(prepared, link)
+    with RunFile(record) as rows:  # not before: a run that does not begin must not cost an older record
         stall_s = max(LEAST_STALL_S, TIMES_THE_WAIT * rehearsal.longest_wait_s)
         followed: Followed = send_and_follow(link, prepared.program.sent, passages, rows, stall_s, watched)
     return outcome_of(rehearsal, followed, passages, prepared.calibration, prepared.controller)
+
+
+def _require_still_ready(prepared: Prepared, link: RobotLink) -> None:
+    """Somebody may have come near, or changed the controller, while the question was open."""
+    _require_same_state(prepared, link)
+    if prepared.tool is not None:
+        obstacles = tcp_obstacles(_tcp_of(link), prepared.tool)
+        if obstacles:
+            raise NotReady(obstacles)
+        _require_same_state(prepared, link)
+
+
+def _require_same_state(prepared: Prepared, link: RobotLink) -> None:
+    state, obstacles, _ = robot_obstacles(link)
+    obstacles += moved_obstacles(state, prepared.state.q_rad)
+    obstacles += payload_obstacles(prepared.load, state, prepared.rehearsal.payloads)[0]
+    if obstacles:
+        raise NotReady(obstacles)
+
+
+def _tool_of(rehearsal: Rehearsal, settings: Settings, options: DeployOptions) -> Array | None:
+    """``(6,)`` X_0T that the correction was made for, as far as can be told; None if it does not matter."""
+    if rehearsal.depends_on_tool:
+        return vectors_from_poses(rehearsal.X_0T[0])
+    if rehearsal.open_end is None:
+        return None
+    if settings.tools:
+        return np.array(settings.tools[0].tool)
+    return None if options.tool is None else np.array(options.tool)
+
+
+def _open_end_remarks(rehearsal: Rehearsal, settings: Settings) -> list[str]:
+    if rehearsal.open_end is None:
+        return []
+    known = f"only the first {len(rehearsal)} targets are known" if len(rehearsal) else "no target is known"
+    remarks = [f"{known}: {rehearsal.open_end}"]
+    if not len(rehearsal):
+        remarks.append("nobody has looked at posture, joint limits and the way to the first target")
+    if settings.unclear:
+        lines = ", ".join(map(str, settings.unclear))
+        remarks.append(f"payload or tool that the program computes cannot be looked at: line {lines}")
+    return remarks
 
 
 def _tcp_of(link: RobotLink) -> Array:
     """``(6,)`` X_0T on the controller. Only its control script tells, which has ended when this returns."""
     with RobotLink(link.host, link.timeout_s) as asking:
         tcp = asking.tcp_offset()
+    if not np.isfinite(tcp).all():
+        raise RobotFault("the controller does not tell its TCP in numbers")
     end = time.monotonic() + QUIET_S
     while link.state().program_running:
         if time.monotonic() > end:
             raise RobotFault("the program that was asked for the TCP does not end")
         time.sleep(0.02)
     return tcp
+
+
+def _require_first_target(rehearsal: Rehearsal, program: SentProgram, options: DeployOptions) -> None:
+    if rehearsal.open_end is None or len(rehearsal) or options.unrehearsed:
+        return
+    raise InputError(
+        "nobody can tell where the program goes first, so that posture, joint limits and its way there cannot be "
+        "looked at",
+        file=program.file,
+        expected="a program whose first move does not depend on the world, or --unrehearsed",
+        found=rehearsal.open_end,
+    )
 
 
 def _require_posture(rehearsal: Rehearsal, program: SentProgram, options: DeployOptions) -> None:
@@ -189,7 +262,7 @@ def _require_posture(rehearsal: Rehearsal, program: SentProgram, options: Deploy
 
 def _require_reach(rehearsal: Rehearsal, calibration: Calibration, program: SentProgram) -> None:
     robot = calibration.model.robot
-    beyond = (rehearsal.q_rad < robot.lower_rad - 1e-6) | (rehearsal.q_rad > robot.upper_rad + 1e-6)
+    beyond = ~((rehearsal.q_rad >= robot.lower_rad - 1e-6) & (rehearsal.q_rad <= robot.upper_rad + 1e-6))
     if beyond.any():
         k, joint = np.argwhere(beyond)[0]
         raise InputError(

@@ -13,16 +13,15 @@ from truepath.deploying.passages import Passages
 from truepath.deploying.run_file import RunFile
 from truepath.lie import Array
 from truepath.robot_link import RobotFault, RobotLink, RobotState
-from truepath.robot_link.readiness import MODES
+from truepath.robot_link.guard import Guard
+from truepath.robot_link.interruptions import uninterrupted
+from truepath.robot_link.readiness import MODES, is_in_remote_control
 from truepath.robot_link.state import RUNNING_MODE
+from truepath.robot_link.stopping import RESTS_WITHIN_S, Rest
 
 LOOK_EVERY_S = 0.04
 START_S = 10.0  # within which a program must be seen to run
-AFTERWARDS_S = 0.3  # the arm settles a moment later than the program ends
 MOVED_RAD = 1e-6
-STOP_TRIED_S = 10.0
-STANDS_RAD_S = 0.01
-PAUSED = "PAUSED"
 
 
 class Watched(Protocol):
@@ -73,30 +72,33 @@ def send_and_follow(
         watched: is told how it goes.
 
     Raises:
-        RobotFault: the program could not be sent; nothing has moved.
+        RobotFault: the dashboard is silent, or the program could not be sent; says what is known of the robot.
     """
-    run = _Run(link, passages, record, watched)
+    if is_in_remote_control(link) is False:
+        raise RobotFault("the robot is in local control: it can be stopped from the teach pendant only")
+    run, sent = _Run(link, passages, record, watched), False
     link.state()
     link.samples()
-    try:
-        link.send_program(text)
-    except BaseException:
-        with contextlib.suppress(RobotFault):
-            link.stop()
-        raise
-    try:
-        run.until_started()
-        run.until_ended(stall_s)
-    except RobotFault as fault:
-        run.stopped(fault.reason)
-    except KeyboardInterrupt:
-        run.followed.interrupted = True
-        run.stopped("stopped by Ctrl-C")
-    except BaseException:
-        run.stopped("stopped")
-        raise
-    finally:
-        run.finish()
+    with Guard(link.host) as guard:
+        try:
+            link.send_program(text)
+            sent = True
+            run.until_started()
+            run.until_ended(stall_s)
+        except RobotFault as fault:
+            run.stopped(fault.reason)
+            if not sent:
+                raise RobotFault(run.followed.ended) from None
+        except KeyboardInterrupt:
+            run.followed.interrupted = True
+            run.stopped("stopped by Ctrl-C")
+        except BaseException:
+            run.stopped("stopped")
+            raise
+        finally:
+            if run.stands:
+                guard.release()
+            run.finish()
     return run.followed
 
 
@@ -104,6 +106,7 @@ class _Run:
     def __init__(self, link: RobotLink, passages: Passages, record: RunFile, watched: Watched) -> None:
         self.link, self.passages, self.record, self.watched = link, passages, record, watched
         self.followed = Followed()
+        self.stands = False
         self.started_s: float | None = None
         self.q_target: Array | None = None
         self.moved_s = time.monotonic()
@@ -117,14 +120,20 @@ class _Run:
                 raise RobotFault(f"the robot has not started the program within {START_S:.0f} s: is it valid for it?")
 
     def until_ended(self, stall_s: float) -> None:
+        """A program is over when the robot says so and stands; one that is paused may go on."""
+        rest, ran_s = Rest(), time.monotonic()
         while True:
             state = self.look()
-            if not state.program_running and not self.is_paused():
+            if rest.take(state):
                 break
-            if time.monotonic() - self.moved_s > stall_s:
+            now_s = time.monotonic()
+            if state.program_running:
+                ran_s = now_s
+            if now_s - ran_s > RESTS_WITHIN_S:
+                raise RobotFault(f"the robot still moves {RESTS_WITHIN_S:.0f} s after its program has ended")
+            if now_s - self.moved_s > stall_s:
                 raise RobotFault(f"the robot has stood for {stall_s:.0f} s while its program runs")
-        time.sleep(AFTERWARDS_S)
-        self.look()
+        self.stands = True
         self.followed.ended, self.followed.completed = "completed", True
 
     def look(self) -> RobotState:
@@ -168,42 +177,19 @@ class _Run:
         self.record.append(time_s, self.passages.count, q, q_target)
         self.watched(self.passages.count, samples[-1])
 
-    def is_paused(self) -> bool:
-        """On the pendant; then it may go on."""
-        try:
-            return self.link.dashboard("programState").upper().startswith(PAUSED)
-        except RobotFault:
-            return False
-
     def stopped(self, why: str) -> None:
         """Whatever it was: makes sure that the robot stands, as far as possible, and says what is known."""
         self.followed.ended = why
-        end = time.monotonic() + STOP_TRIED_S
-        while True:
+        with uninterrupted():
             try:
                 self.link.stop()
-                break
             except RobotFault as fault:
-                if time.monotonic() > end:
-                    self.followed.ended += (
-                        f"; it could not be told to stop ({fault.reason}): whether it still moves is not known"
-                    )
-                    return
-                time.sleep(LOOK_EVERY_S)
-        self.followed.ended += "; it was told to stop" + self._standing()
-
-    def _standing(self) -> str:
-        """What is seen of a robot that was told to stop."""
-        end = time.monotonic() + STOP_TRIED_S
-        try:
-            while np.abs(self.link.state().speed_rad_s).max() > STANDS_RAD_S:
-                if time.monotonic() > end:
-                    return ", and still moves"
-                time.sleep(LOOK_EVERY_S)
-            self.take(self.link.samples())
-        except RobotFault:
-            return ", but cannot be seen"
-        return " and stands"
+                self.followed.ended += f"; it was told to stop, but {fault.reason}"
+            else:
+                self.stands = True
+                self.followed.ended += "; it was told to stop and stands"
+            with contextlib.suppress(RobotFault):
+                self.take(self.link.samples())
 
     def finish(self) -> None:
         if self.followed.last is not None:

@@ -18,6 +18,7 @@ from truepath.same_robot import what_differs
 
 # A reflector that comes off between measuring and welding weighs less than this, and bends the arm by microns.
 MASS_TOLERANCE_KG, MOMENT_TOLERANCE_KG_M = 0.25, 0.02
+TOLD_KG = 0.05
 BARE_ARMS = ("ur5", "ur10")
 
 
@@ -37,9 +38,13 @@ class Load:
         where = "" if self.centre_m is None else f" at ({', '.join(str(round(1e3 * x)) for x in self.centre_m)}) mm"
         return f"{self.mass_kg:.2f} kg{where}"
 
+    def is_a_little_other(self, other: Load) -> bool:
+        """Whether somebody should hear of the difference, though it may pass."""
+        return self.is_like(other) and abs(self.mass_kg - other.mass_kg) > TOLD_KG
+
     def is_like(self, other: Load) -> bool:
         """Whether gravity does the same with both, within what a calibration would notice."""
-        if abs(self.mass_kg - other.mass_kg) > MASS_TOLERANCE_KG:
+        if not abs(self.mass_kg - other.mass_kg) <= MASS_TOLERANCE_KG:  # not even with a NaN
             return False
         if self.centre_m is None or other.centre_m is None:
             return True

@@ -18,9 +18,8 @@ LONG_GAP_S = 0.1
 def print_prepared(prepared: Prepared) -> None:
     """Before the question whether the robot may move."""
     rehearsal = prepared.rehearsal
-    console.out.print(
-        f"{prepared.program.file}: {len(rehearsal)} targets, for {prepared.calibration.robot.name}; the robot is ready"
-    )
+    known = f"{len(rehearsal)} targets" if len(rehearsal) or rehearsal.open_end is None else "targets that nobody knows"
+    console.out.print(f"{prepared.program.file}: {known}, for {prepared.calibration.robot.name}; the robot is ready")
     if len(rehearsal):
         away = np.degrees(rehearsal.q_rad[0] - prepared.state.q_rad)
         console.out.print(f"it goes to line {rehearsal.line[0]} first, by {_angles(away)} deg")

@@ -16,7 +16,7 @@ from truepath.controller import Controller, vectors_from_poses
 from truepath.lie import Array
 from truepath.postures import follow_targets
 from truepath.programs.motions import Kind
-from truepath.virtual.controller.script_instructions import Move, SetPayload, Six, Wait
+from truepath.virtual.controller.script_instructions import Move, SetPayload, Six, SpeedJoints, Wait
 from truepath.virtual.controller.script_runner import run_script
 from truepath.virtual.controller.script_values import matrix
 
@@ -111,6 +111,9 @@ def rehearse(text: str, controller: Controller, q_start_rad: Array, tool: Sequen
                 again = turns[each.line, each.q_rad]
             elif isinstance(each, SetPayload):
                 payloads.append(each)
+            elif isinstance(each, SpeedJoints) and any(each.speed_rad_s):
+                open_end = f"line {each.line} moves the joints by speed, to wherever they are then"
+                break
             elif isinstance(each, Wait):
                 longest = max(longest, each.time_s)
             if again >= MOST_TURNS or len(moves) >= MOST_TARGETS or count >= MOST_INSTRUCTIONS:

@@ -13,7 +13,7 @@ from truepath.guards import calibration_findings
 from truepath.programs.urscript.script import read_bytes
 from truepath.rewriting.named_robot import robot_named_in
 from truepath.rewriting.open import SCRIPTS
-from truepath.stamp import Stamp, find_stamp
+from truepath.stamp import Stamp, body_sha256, find_stamp
 from truepath.virtual.controller.script_instructions import ScriptError
 from truepath.virtual.controller.script_syntax import read_syntax
 
@@ -29,12 +29,14 @@ class SentProgram:
         text: as in the file; its lines are those of all messages.
         sent: what the controller gets: the same, as one function.
         stamp: of its correction; None if it was not corrected.
+        body_sha256: of the file without the line of its stamp; None without one.
     """
 
     file: str
     text: str
     sent: str
     stamp: Stamp | None
+    body_sha256: str | None
 
 
 def read_program(path: str | Path) -> SentProgram:
@@ -52,7 +54,8 @@ def read_program(path: str | Path) -> SentProgram:
             found=path.suffix or "no ending",
         )
     try:
-        text = read_bytes(path).decode("utf-8").removeprefix("\ufeff")
+        raw = read_bytes(path)
+        text = raw.decode("utf-8").removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         raise InputError("the program is not UTF-8 text", file=path, found=f"byte {error.start}") from None
     try:
@@ -67,15 +70,19 @@ def read_program(path: str | Path) -> SentProgram:
         raise InputError(
             "the controller would start one program only", file=path, expected="1", found=str(len(syntax.programs))
         )
-    stamp = find_stamp(text, path, "#")
-    return SentProgram(str(path), text, _as_function(text) if syntax.bare else text, stamp and stamp[0])
+    sent = _as_function(text) if syntax.bare else text
+    found = find_stamp(text, path, "#")
+    if found is None:
+        return SentProgram(str(path), text, sent, None, None)
+    stamp, line = found
+    return SentProgram(str(path), text, sent, stamp, body_sha256(raw, line))
 
 
 def require_correction(program: SentProgram, calibration: Calibration) -> None:
     """Refuses a program that was not corrected with this calibration.
 
     Raises:
-        InputError: no stamp, or that of another calibration.
+        InputError: no stamp, that of another calibration or of an earlier version, or another program below it.
     """
     wanted = hashlib.sha256(calibration.to_json().encode()).hexdigest()
     if program.stamp is None:
@@ -84,6 +91,20 @@ def require_correction(program: SentProgram, calibration: Calibration) -> None:
             file=program.file,
             expected="a program written by truepath correct, or --uncorrected to send it all the same",
             found="no stamp",
+        )
+    if program.stamp.body_sha256 is None:
+        raise InputError(
+            "the program was corrected by an earlier version, whose stamp does not tell whether it was changed since",
+            file=program.file,
+            expected="a program that is corrected again, or --uncorrected",
+            found=f"truepath {program.stamp.version}",
+        )
+    if program.stamp.body_sha256 != program.body_sha256:
+        raise InputError(
+            "the program was changed after it was corrected",
+            file=program.file,
+            expected=f"what truepath correct wrote on {program.stamp.day}, or --uncorrected",
+            found="other content below the same stamp",
         )
     if program.stamp.calibration_sha256 != wanted:
         raise InputError(

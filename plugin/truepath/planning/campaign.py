@@ -15,7 +15,7 @@ from truepath.planning.effects_planned import planned_terms
 from truepath.planning.feasible import Feasible
 from truepath.planning.information import ReadingModel
 from truepath.planning.order import Mixing, mixed_order, standardised
-from truepath.planning.pose_list import NO_POSE, PoseList
+from truepath.planning.pose_list import NO_POSE, PoseList, robot_mark
 from truepath.planning.visits import Visiting
 from truepath.planning.ways import Ways
 
@@ -187,7 +187,7 @@ def _driven(
         rows.append(target)
         pose_id.append(number)
     ids = np.array(pose_id)
-    return PoseList(np.array(rows), ids != NO_POSE, ids)
+    return PoseList(np.array(rows), ids != NO_POSE, ids, robot_mark(visiting.feasible.robot))
 
 
 def require_sense(wish: Wish, seed: int) -> None:

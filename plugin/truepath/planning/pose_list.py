@@ -3,8 +3,9 @@
 CSV with the columns of a data set as far as they are known beforehand: ``pose_id,measure,q1_rad,...,qn_rad``. Rows
 are driven in order, all joints in step. ``measure`` is 1 where the robot stops to be measured and 0 where it only
 passes: on a detour, or at the point from which a pose is to be approached. ``pose_id`` is the same for repeated
-visits of a pose and empty where nothing is measured. ``q*_deg`` is understood too; without ``measure`` every row is
-measured, without ``pose_id`` every pose is one of its own.
+visits of a pose and empty where nothing is measured. ``robot``, which may be missing, is the same in every row: the
+name of the model for which the poses were planned and the hash of its geometry. ``q*_deg`` is understood too; without
+``measure`` every row is measured, without ``pose_id`` every pose is one of its own.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +22,11 @@ from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.tables import Table, read_table
 
+if TYPE_CHECKING:
+    from truepath.robot import NominalRobot
+
 NO_POSE = -1
+ROBOT_MARK = r"[A-Za-z0-9_.-]{1,40}:[0-9a-f]{12}"
 MOST_POSE_ID = 10**9
 SAME_POSE_RAD = 1e-6
 
@@ -33,11 +39,13 @@ class PoseList:
         q_rad: ``(N, n)``.
         measure: ``(N,)`` bool, whether the robot stops there to be measured.
         pose_id: ``(N,)`` int, the same for repeated visits of one pose; ``NO_POSE`` (-1) where nothing is measured.
+        robot: for which they were planned, see ``robot_mark``; empty if that is not known.
     """
 
     q_rad: Array
     measure: Array
     pose_id: Array
+    robot: str = ""
 
     def __len__(self) -> int:
         return len(self.q_rad)
@@ -53,14 +61,14 @@ def read_pose_list(path: str | Path) -> PoseList:
     numbers = sorted({int(m[1]) for name in table.header if (m := re.fullmatch(r"q([1-9]\d{0,2})_(rad|deg)", name))})
     joints = [f"q{i + 1}" for i in range(max(numbers, default=1))]
     names, factor = unit_columns(table, joints, ANGLE_UNITS)
-    strange = [name for name in table.header if name not in (*names, "measure", "pose_id")]
+    strange = [name for name in table.header if name not in (*names, "measure", "pose_id", "robot")]
     if strange:
         raise InputError(
             "a file of poses to be measured has no such column",
             file=table.file,
             line=1,
             column=strange[0],
-            expected=", ".join(["pose_id", "measure", *names]),
+            expected=", ".join(["pose_id", "measure", *names, "robot"]),
             found=strange[0],
         )
     q_rad = table.numbers(names) * factor
@@ -69,17 +77,41 @@ def read_pose_list(path: str | Path) -> PoseList:
     if not measure.any():
         raise InputError("nothing is to be measured", file=table.file, expected="measure 1 in at least one row")
     _require_same_joints(table, q_rad, pose_id)
-    return PoseList(q_rad, measure, pose_id)
+    return PoseList(q_rad, measure, pose_id, _robot(table))
 
 
 def to_csv(poses: PoseList) -> str:
     """The file as text, joints to the nanoradian."""
-    header = ["pose_id", "measure", *(f"q{i + 1}_rad" for i in range(poses.q_rad.shape[1]))]
+    robot = [poses.robot] if poses.robot else []
+    header = [
+        "pose_id",
+        "measure",
+        *(f"q{i + 1}_rad" for i in range(poses.q_rad.shape[1])),
+        *(["robot"] if robot else []),
+    ]
     rows = (
-        [str(pose) if pose >= 0 else "", "1" if stop else "0", *(f"{angle:.9f}" for angle in q)]
+        [str(pose) if pose >= 0 else "", "1" if stop else "0", *(f"{angle:.9f}" for angle in q), *robot]
         for pose, stop, q in zip(poses.pose_id.tolist(), poses.measure.tolist(), poses.q_rad.tolist(), strict=True)
     )
     return "\n".join(",".join(row) for row in (header, *rows)) + "\n"
+
+
+def robot_mark(robot: NominalRobot) -> str:
+    """The name of a model and the beginning of the hash of its geometry, as in ``ur5:70edbdbe4e25``."""
+    name = robot.name if re.fullmatch(r"[\w.-]{1,40}", robot.name, re.ASCII) else "robot"
+    return f"{name}:{robot.model_sha256[:12]}"
+
+
+def _robot(table: Table) -> str:
+    if "robot" not in table.header:
+        return ""
+    cells = table.text("robot")
+    for cell, line in zip(cells, table.lines, strict=True):
+        if cell != cells[0]:
+            raise _bad(table, int(line), "robot", "poses of two robots in one list", repr(cells[0]), cell)
+        if not re.fullmatch(ROBOT_MARK, cell):
+            raise _bad(table, int(line), "robot", "this names no robot", "a name and a hash, ur5:0123456789ab", cell)
+    return cells[0]
 
 
 def _measure(table: Table) -> Array:

@@ -9,12 +9,16 @@ import numpy as np
 
 from truepath.lie import Array
 from truepath.planning.pose_list import PoseList
+from truepath.recording.belonging import Belonging
+from truepath.recording.departures import Departures
+from truepath.recording.free_robot import require_free_robot
 from truepath.recording.manner import Manner
 from truepath.recording.readings import BeamBroken, Reading
 from truepath.recording.route import Route, back_and_forth, route
 from truepath.recording.row_file import RowFile
 from truepath.recording.trackers import Tracker
 from truepath.recording.visit import Visit, cells
+from truepath.robot import NominalRobot
 from truepath.robot_link import RobotFault, RobotLink, RobotState
 from truepath.robot_link.standstill import STILL_RAD, wait_until_still
 
@@ -43,6 +47,7 @@ class Campaign:
         tracker: that sees its reflector.
         poses: the list.
         rows: where visits go; what is done already is left out.
+        robot: as drawn; readings that cannot be of it are not believed.
         payload_kg: to be written in each row.
         manner: of driving and measuring.
     """
@@ -53,6 +58,7 @@ class Campaign:
         tracker: Tracker,
         poses: PoseList,
         rows: RowFile,
+        robot: NominalRobot,
         payload_kg: float,
         manner: Manner,
     ) -> None:
@@ -60,6 +66,7 @@ class Campaign:
         self._payload_kg, self._manner = payload_kg, manner
         self._say: Callable[[str], None] = lambda text: None
         self._approach = np.zeros(poses.q_rad.shape[1], int)
+        self._departures, self._belonging = Departures(tracker, robot, manner.measure_s), Belonging(robot)
         self._at: int | None = None
         self._agreed_q_rad: Array | None = None
 
@@ -79,6 +86,10 @@ class Campaign:
         self._pass(again, outcome)
         return outcome
 
+    def require_free_robot(self) -> None:
+        """To be asked once more after a question was answered. Raises RobotFault: the robot is in use by now."""
+        require_free_robot(self._link)
+
     def to_do(self) -> list[int]:
         """Rows of the list that are to be measured and are not yet."""
         return [int(row) for row in np.flatnonzero(self._poses.measure) if int(row) not in self._rows.done]
@@ -92,9 +103,14 @@ class Campaign:
     def _pass(self, goals: Iterable[int], outcome: Outcome) -> None:
         in_a_row = 0
         for goal in goals:
-            for row in self._way_to(goal):
+            for k, row in enumerate(self._way_to(goal)):
                 self._say(self._progress(goal))
+                if k == 0:  # the robot has stood still before: it can be seen how late the tracker tells
+                    self._departures.robot_stands()
+                    self._link.samples()
                 self._drive(row)
+                if k == 0:
+                    self._departures.look(self._link.samples())
             try:
                 visit = self._visit(goal)
             except BeamBroken as broken:
@@ -138,7 +154,8 @@ class Campaign:
             if attempt:
                 self._say(f"{self._progress(row)}; again, because {why}")
                 self._wait_watching()
-            wait_until_still(self._link, self._manner.settle_s, self._manner.rest_s)
+            still_s = self._manner.settle_s + self._departures.delay_s
+            wait_until_still(self._link, still_s, self._manner.rest_s)
             self._link.samples()
             try:
                 reading = self._tracker.reading(self._manner.measure_s)
@@ -164,7 +181,7 @@ class Campaign:
             return "the robot was not still"
         if reading.spread_mm > self._manner.max_spread_mm:
             return f"the reflector was not still: spread {reading.spread_mm:.3f} mm"
-        return ""
+        return self._belonging.why_not(self._poses.q_rad[row], reading.p_ME)
 
     def _recorded(self, row: int, during: list[RobotState], reading: Reading) -> Visit:
         return Visit(

@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from truepath.errors import InputError
-from truepath.planning.pose_list import PoseList
+from truepath.planning.pose_list import PoseList, robot_mark
 from truepath.robot import NominalRobot
+
+
+def require_of_robot(poses: PoseList, robot: NominalRobot, file: str) -> None:
+    """Raises InputError if the list says that it was planned for a robot of another geometry."""
+    mark = robot_mark(robot)
+    if poses.robot and poses.robot.rpartition(":")[2] != mark.rpartition(":")[2]:
+        problem = "the poses were planned for another robot"
+        raise InputError(problem, file=file, line=2, column="robot", expected=mark, found=poses.robot)
 
 
 def require_within_limits(poses: PoseList, robot: NominalRobot, file: str) -> None:

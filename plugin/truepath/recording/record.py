@@ -13,7 +13,9 @@ import numpy as np
 from truepath.lie import Array
 from truepath.planning.pose_list import read_pose_list
 from truepath.recording.campaign import Campaign
-from truepath.recording.limits import require_within_limits
+from truepath.recording.circumstances import Circumstances, tracker_kind
+from truepath.recording.free_robot import require_free_robot, serial_number
+from truepath.recording.limits import require_of_robot, require_within_limits
 from truepath.recording.manner import Manner
 from truepath.recording.payload import extra_payload_kg
 from truepath.recording.row_file import RowFile, require_free
@@ -21,7 +23,6 @@ from truepath.recording.trackers import open_tracker
 from truepath.recording.visit import columns
 from truepath.robot import NominalRobot
 from truepath.robot_link import RobotLink
-from truepath.robot_link.readiness import require_ready
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,19 +69,21 @@ def prepared(
 
     Raises:
         InputError: the files, the tracker's lines, the settings.
-        RobotFault: the robot is not there, or not able to move.
+        RobotFault: the robot is not there, or not able to move, or in use.
     """
     poses = read_pose_list(poses_file)
+    require_of_robot(poses, robot, str(poses_file))
     require_within_limits(poses, robot, str(poses_file))
     require_free(output, resume=resume)
     with RobotLink(host) as link, open_tracker(tracker_spec, host) as tracker:
-        state = require_ready(link)
+        state = require_free_robot(link)
         if payload_kg is None:
             payload_kg = extra_payload_kg(state, robot)
         header = columns(robot.num_joints, tracker.gives_orientation)
         sha256 = hashlib.sha256(poses_file.read_bytes()).hexdigest()
-        with RowFile(output, poses, sha256, header, resume=resume) as rows:
-            campaign = Campaign(link, tracker, poses, rows, payload_kg, manner)
+        made_with = Circumstances(robot.model_sha256, payload_kg, tracker_kind(tracker_spec), serial_number(link))
+        with RowFile(output, poses, sha256, header, resume=resume, circumstances=made_with) as rows:
+            campaign = Campaign(link, tracker, poses, rows, robot, payload_kg, manner)
             way, intention = campaign.first_route(), None
             if way is not None:
                 travel_deg = np.degrees(poses.q_rad[way.rows[0]] - state.q_target_rad)

@@ -10,6 +10,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +18,19 @@ from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.measurements import from_table
 from truepath.planning.pose_list import PoseList
+from truepath.recording.circumstances import Circumstances
 from truepath.tables import Table, read_table
 
 SCHEMA = "truepath.recording/1"
 SAME_JOINTS_RAD = 1e-9
+NOT_KNOWN = Circumstances()
 
 
 class RowFile:
     """An open data set to which visits are appended; a context manager.
 
-    Beside it lies ``NAME.progress.json``, which says to which list of poses it belongs and when it was begun.
+    Beside it lies ``NAME.progress.json``, which says to which list of poses it belongs, when it was begun, and with
+    which robot, payload and tracker. Both are taken away again if they were made for nothing.
 
     Args:
         path: of the data set.
@@ -35,24 +39,37 @@ class RowFile:
         header: columns of the data set.
         resume: go on with what is there, if anything is. A last line without its end is dropped: the row was never
             complete, and its pose is measured again.
+        circumstances: written down in a new file, and compared with those of one that goes on.
 
     Raises:
-        InputError: the file exists and nothing was said of resuming; it belongs to another list; a row is not one of
+        InputError: the file exists and nothing was said of resuming; it belongs to another list, or
+            other circumstances; a row is not one of
             this list; somebody else is recording into it.
     """
 
-    def __init__(self, path: Path, poses: PoseList, poses_sha256: str, header: Sequence[str], *, resume: bool) -> None:
+    def __init__(
+        self,
+        path: Path,
+        poses: PoseList,
+        poses_sha256: str,
+        header: Sequence[str],
+        *,
+        resume: bool,
+        circumstances: Circumstances = NOT_KNOWN,
+    ) -> None:
         self.path, self._poses, self._header = path, poses, list(header)
         self.done: set[int] = set()
         self._last_time_s = 0.0
         require_free(path, resume=resume)
         exists = path.exists()
+        self._is_new = not exists
         side_file = progress_file(path)
         if exists:
-            self._began_s = _read_progress(side_file, path, poses_sha256)
+            self._began_s = _read_progress(side_file, path, poses_sha256, circumstances)
         else:
             self._began_s = time.time()
-            content = {"schema": SCHEMA, "poses_sha256": poses_sha256, "began_unix_s": self._began_s}
+            content: dict[str, Any] = {"schema": SCHEMA, "poses_sha256": poses_sha256, "began_unix_s": self._began_s}
+            content["circumstances"] = circumstances.as_json()
             write_atomically(side_file, json.dumps(content, indent=1) + "\n")
         self._handle = _open(path)
         try:
@@ -87,6 +104,11 @@ class RowFile:
         self.done.add(row)
 
     def close(self) -> None:
+        """A new file without a row is taken away: nothing was recorded."""
+        if self._is_new and not self.done:
+            for file in (self.path, progress_file(self.path)):
+                with contextlib.suppress(OSError):
+                    file.unlink()
         os.close(self._handle)
 
     def _write(self, cells: Sequence[str]) -> None:
@@ -175,14 +197,15 @@ def _sync_folder(path: Path) -> None:
         os.close(folder)
 
 
-def _read_progress(side_file: Path, path: Path, poses_sha256: str) -> float:
-    """When the recording began, as Unix time. Raises InputError unless the file belongs to this list."""
+def _read_progress(side_file: Path, path: Path, poses_sha256: str, circumstances: Circumstances) -> float:
+    """When the recording began, as Unix time. Raises InputError unless the file belongs to this list and robot."""
     try:
         content = json.loads(side_file.read_bytes())
         if content["schema"] != SCHEMA:
             raise ValueError("unknown schema")
         began_s, found = float(content["began_unix_s"]), str(content["poses_sha256"])
-        if not np.isfinite(began_s):
+        written = content.get("circumstances", {})  # older files tell nothing
+        if not (np.isfinite(began_s) and isinstance(written, dict)):
             raise ValueError("no time")
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
@@ -198,4 +221,5 @@ def _read_progress(side_file: Path, path: Path, poses_sha256: str) -> float:
             expected=f"a recording of the list with hash {poses_sha256[:12]}",
             found=f"one of {found[:12]}",
         )
+    circumstances.require_same(written, side_file)
     return began_s

@@ -24,6 +24,8 @@ PATIENCE_S = 3.0  # beyond the duration asked for, until enough readings have co
 POLL_S = 0.01
 SPECS = "file:PATH, tcp:HOST:PORT or simulated"
 
+Seen = tuple[float, "tuple[float, ...] | None"]  # moment, and the numbers of a line; None where the beam is broken
+
 
 class Tracker(Protocol):
     """Looks at the reflector."""
@@ -39,6 +41,9 @@ class Tracker(Protocol):
             BeamBroken: the reflector was out of sight meanwhile, or nothing came.
             InputError: what came was not what a tracker says.
         """
+
+    def seen_since(self, start_s: float) -> list[Seen]:
+        """Whatever was seen from a moment of ``time.monotonic()`` on, the last few seconds at least."""
 
     def close(self) -> None: ...
 
@@ -57,7 +62,7 @@ class LineTracker:
     def __init__(self, source: Source, patience_s: float = PATIENCE_S) -> None:
         self._source, self._patience_s = source, patience_s
         self._reader, self._lateness = LineReader(source.name), Lateness()
-        self._seen: deque[tuple[float, tuple[float, ...] | None]] = deque(maxlen=2 * MOST_READINGS_PER_S)
+        self._seen: deque[Seen] = deque(maxlen=2 * MOST_READINGS_PER_S)
         self._lock = threading.Lock()
         self._fault: InputError | None = None
         self._lost: str | None = None
@@ -85,7 +90,7 @@ class LineTracker:
         start_s = time.monotonic()
         while True:
             now_s = time.monotonic()
-            seen = self._seen_since(start_s)
+            seen = self.seen_since(start_s)
             if now_s - start_s >= duration_s:
                 numbers = [reading for _, reading in seen if reading is not None]
                 if self._broken or len(numbers) < len(seen):
@@ -95,6 +100,11 @@ class LineTracker:
                 if now_s - start_s >= duration_s + self._patience_s:
                     raise BeamBroken(self._why_nothing())
             time.sleep(POLL_S)
+
+    def seen_since(self, start_s: float) -> list[Seen]:
+        self._raise_fault()
+        with self._lock:
+            return [(moment_s, reading) for moment_s, reading in self._seen if moment_s >= start_s]
 
     def close(self) -> None:
         self._ended.set()
@@ -110,11 +120,6 @@ class LineTracker:
                 raise InputError("no tracker", file=self._source.name, expected=expected, found=found_instead)
             time.sleep(POLL_S)
         return found
-
-    def _seen_since(self, start_s: float) -> list[tuple[float, tuple[float, ...] | None]]:
-        self._raise_fault()
-        with self._lock:
-            return [(moment_s, reading) for moment_s, reading in self._seen if moment_s >= start_s]
 
     def _raise_fault(self) -> None:
         if self._fault is not None:

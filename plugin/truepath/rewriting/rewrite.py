@@ -30,7 +30,7 @@ from truepath.rewriting.said import program_findings
 from truepath.rewriting.vias import Vias, choose_vias
 from truepath.rewriting.watch import watch
 from truepath.rewriting.ways import Ways, sample_ways
-from truepath.stamp import Stamp, refuse_if_stamped
+from truepath.stamp import Stamp, refuse_if_stamped, sealed
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,10 +270,11 @@ def _refuse(findings: list[Finding], file: str) -> None:
 def _written(program: Program, expressed: Expressed, calibration: Calibration, today: date) -> bytes:
     if not len(expressed.targets.index) and not expressed.vias:
         return program.raw  # as it was, to the byte
-    header = ""
-    if program.comment is not None:
-        header = Stamp.of(program.raw, calibration.to_json().encode(), today).line(program.comment)
-    return program.rewritten(expressed.targets, expressed.vias, header)
+    if program.comment is None:
+        return program.rewritten(expressed.targets, expressed.vias, "")
+    stamp = Stamp.of(program.raw, calibration.to_json().encode(), today)
+    content = program.rewritten(expressed.targets, expressed.vias, stamp.line(program.comment))
+    return sealed(content, stamp, program.comment)
 
 
 def _statistics(values: Array) -> dict[str, float] | None:

@@ -27,12 +27,16 @@ class ChildProcess:
         module: its name, run with ``python -m``.
         arguments: of the process.
         on_message: called in a thread of its own with every message; without it messages wait for ``answer``.
+
+    Attributes:
+        gave_up_itself: it has answered with an error.
     """
 
     def __init__(self, module: str, arguments: list[str], on_message: Callable[[Message], None] | None = None) -> None:
         self._messages: queue.Queue[Message | None] = queue.Queue()
         self._on_message = on_message or self._messages.put
         self._printed = b""
+        self.gave_up_itself = False
         # In a session of its own, so that Ctrl-C reaches the parent only, which then has the robot stopped.
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
@@ -79,6 +83,7 @@ class ChildProcess:
         if message is None:
             raise RobotFault(self.last_words())
         if "error" in message:
+            self.gave_up_itself = True
             raise RobotFault(f"{question}: {message['error']}")
         return message["answer"]
 
@@ -91,12 +96,16 @@ class ChildProcess:
 
     def close(self, patience_s: float = 2.0) -> None:
         """Lets the child end by itself, for a while."""
-        with contextlib.suppress(OSError, ValueError):
-            assert self._process.stdin is not None
-            self._process.stdin.close()
+        self.leave_alone()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(patience_s)
         self.kill()
+
+    def leave_alone(self) -> None:
+        """Closes the pipe to the child, which does what it does when its parent has gone."""
+        with contextlib.suppress(OSError, ValueError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
 
     def kill(self) -> None:
         """Ends the child for sure; this process is not touched by whatever state it was in."""

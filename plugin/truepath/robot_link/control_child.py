@@ -11,9 +11,11 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from truepath.robot_link.parent_death import dying_with_parent
 from truepath.robot_link.pipes import Pipes
 
 STOP_RAD_S2 = 4.0
+WATCHED_HZ, KICKED_EVERY_S = 1.0, 0.1
 CONNECT_S, END_S = 60, 10  # the parent has lost its patience before, if there still is one
 
 
@@ -23,21 +25,24 @@ def main(host: str) -> None:
     try:
         from rtde_control import RTDEControlInterface  # type: ignore[import-not-found]
 
-        with pipes.at_most(CONNECT_S):
+        # What this process does meanwhile it cannot look after: a script that is sent late has nobody to end it.
+        with dying_with_parent(), pipes.at_most(CONNECT_S):
             control = RTDEControlInterface(host)
     except Exception as error:  # the client throws whatever it likes
         pipes.say({"error": str(error) or type(error).__name__})
         os._exit(1)
-    pipes.say({"answer": True})
-    closed = False
-    for request in pipes.requests():
+    closed, heard = False, pipes.is_heard({"answer": True})
+    control.setWatchdog(WATCHED_HZ)  # a robot whose client is silent for longer stops by itself
+    for request in pipes.requests(control.kickWatchdog, KICKED_EVERY_S) if heard else ():
         closed = request["do"] == "close"
         if closed:
             break
         try:
-            pipes.say({"answer": _do(control, request)})
+            answer = {"answer": _do(control, request)}
         except Exception as error:
-            pipes.say({"error": str(error) or type(error).__name__})
+            answer = {"error": str(error) or type(error).__name__}
+        if not pipes.is_heard(answer):
+            break
     try:
         with pipes.at_most(END_S):
             if not closed:

@@ -20,7 +20,9 @@ from truepath.lie import Array
 from truepath.robot_link import text_ports
 from truepath.robot_link.child_process import ChildProcess, Message, wait_for
 from truepath.robot_link.fault import RobotFault
+from truepath.robot_link.interruptions import deferred, uninterrupted
 from truepath.robot_link.state import RobotState, from_sample
+from truepath.robot_link.stopping import STOP_PROGRAM, Way, bring_to_rest
 
 RATE_HZ = 125.0
 UNREAD_SAMPLES = int(120 * RATE_HZ)
@@ -32,6 +34,9 @@ SLOWEST_FRACTION = 0.02
 STARTS_TRIED = 3
 POLL_S = 0.002
 START_S = 12.0  # the client uploads its script and waits for it to run
+STOP_LIMIT_S = 10.0
+STOP_ANSWER_S = 1.0  # while a robot moves that is to stop, nothing is waited for for long
+STOP_CONTROL_S = 4.0
 
 
 class RobotLink:
@@ -64,16 +69,19 @@ class RobotLink:
 
     def state(self) -> RobotState:
         """The first sample that arrives after the call: what happened before the call is in it."""
-        self._start_reading()
+        return self._state(self.timeout_s, max(START_S, self.timeout_s))
+
+    def _state(self, within_s: float, start_s: float) -> RobotState:
+        self._start_reading(start_s)
         asked_s = time.monotonic()
-        if not wait_for(lambda: self._is_after(asked_s) or self._is_lost(), self.timeout_s, POLL_S) or self._is_lost():
-            raise RobotFault(f"{self.host}: {self._fault or f'no data from the robot for {self.timeout_s:.1f} s'}")
+        if not wait_for(lambda: self._is_after(asked_s) or self._is_lost(), within_s, POLL_S) or self._is_lost():
+            raise RobotFault(f"{self.host}: {self._fault or f'no data from the robot for {within_s:.1f} s'}")
         assert self._newest is not None
         return from_sample(self._newest, self._tcp_offset)
 
     def samples(self) -> list[RobotState]:
         """All samples since the last call, of the last two minutes at most; empty when the robot sends nothing."""
-        self._start_reading()
+        self._start_reading(max(START_S, self.timeout_s))
         with self._lock:
             taken = list(self._samples)
             self._samples.clear()
@@ -105,16 +113,35 @@ class RobotLink:
         return self._tcp_offset
 
     def stop(self) -> None:
-        """Stops the robot by every way there is, until one works."""
-        if self._control is not None and self._control.alive:
-            with contextlib.suppress(RobotFault):
-                self._ask({"do": "stop"}, self.timeout_s)
-                return
-        self._end_control()
+        """Stops the robot by every way there is, until it is seen to stand and no program runs on it.
+
+        Signals that would interrupt are nothing meanwhile; it takes a limited time.
+
+        Raises:
+            RobotFault: it was not seen to come to rest; says what is known.
+        """
+        text_ways: list[Way] = [("dashboard", self._stop_by_dashboard), ("script port", self._stop_by_program)]
+        control: Way = ("control script", self._stop_by_control)
+        is_in_control = self._control is not None and self._control.alive
+        ways = [control, *text_ways] if is_in_control else [*text_ways, control]
+        with uninterrupted():
+            bring_to_rest(lambda: self._state(STOP_ANSWER_S, STOP_CONTROL_S), ways, STOP_LIMIT_S)
+
+    def _stop_by_dashboard(self) -> str:
+        return text_ports.ask_dashboard(self.host, "stop", STOP_ANSWER_S)
+
+    def _stop_by_program(self) -> str:
+        text_ports.send_program(self.host, STOP_PROGRAM, STOP_ANSWER_S)
+        return ""
+
+    def _stop_by_control(self) -> str:
+        """Takes control if this link has none: what runs on the robot is replaced. Gives it back, either way."""
         try:
-            self.dashboard("stop")
-        except RobotFault:
-            self.send_program("def truepath_stop():\n  stopj(4.0)\nend\n")
+            self._start_control(1, STOP_CONTROL_S)
+            self._ask({"do": "stop"}, STOP_CONTROL_S)
+        finally:
+            self._end_control()
+        return ""
 
     def send_program(self, text: str) -> None:
         """Sends a URScript program to the controller, which starts it at once."""
@@ -143,11 +170,24 @@ class RobotLink:
                 if self._ask(request, self.timeout_s) is not True:
                     raise RobotFault(f"the robot refuses to move; {_unable(self.state())}")
             self._follow_move(before, is_there, duration_s)
-        except BaseException:  # Ctrl-C too: whatever happened, nobody is watching this move any more
-            with contextlib.suppress(RobotFault):
-                self.stop()
-            self._end_control()
+        except BaseException as error:  # Ctrl-C too: whatever happened, nobody is watching this move any more
+            with uninterrupted():
+                known = self._stopped()
+            if isinstance(error, RobotFault):
+                raise RobotFault(f"{error.reason}; {known}") from None
+            if isinstance(error, KeyboardInterrupt):
+                raise KeyboardInterrupt(known) from None
             raise
+
+    def _stopped(self) -> str:
+        """Stops the robot; what is then known of it."""
+        try:
+            self.stop()
+        except RobotFault as fault:
+            return f"it was told to stop, but {fault.reason}"
+        finally:
+            self._end_control()
+        return "it was told to stop and stands"
 
     def _follow_move(self, state: RobotState, is_there: Any, duration_s: float) -> None:
         began_s = moved_s = time.monotonic()
@@ -177,38 +217,52 @@ class RobotLink:
             self._end_control()
             raise
 
-    def _start_control(self) -> ChildProcess:
+    def _start_control(self, tries: int = STARTS_TRIED, patience_s: float | None = None) -> ChildProcess:
         if self._control is not None and self._control.alive:
             return self._control
-        for attempt in range(STARTS_TRIED):
-            self._control = ChildProcess("truepath.robot_link.control_child", [self.host])
+        for attempt in range(tries):
+            control = ChildProcess("truepath.robot_link.control_child", [self.host])
             try:
-                self._control.answer(max(START_S, self.timeout_s), "taking control of the robot")
-                return self._control
+                control.answer(patience_s or max(START_S, self.timeout_s), "taking control of the robot")
+                self._control = control
+                return control
             except RobotFault:
                 # A client that has just been killed may still hold the controller's registers.
-                self._end_control()
-                if attempt == STARTS_TRIED - 1:
+                self._abandon(control)
+                if attempt == tries - 1:
                     raise
                 time.sleep(0.5)
+            except BaseException:
+                self._abandon(control)
+                raise
         raise AssertionError("unreachable")
+
+    def _abandon(self, control: ChildProcess) -> None:
+        """Ends a client that has not come so far as to answer. What it has sent meanwhile must not stay there."""
+        with deferred():
+            gave_up_itself = control.gave_up_itself
+            control.kill()
+            if not gave_up_itself:  # else nothing was sent, and what runs on the robot is not ours
+                with contextlib.suppress(RobotFault):
+                    self._stop_by_program()
 
     def _end_control(self) -> None:
         control, self._control = self._control, None
         if control is not None:
-            with contextlib.suppress(RobotFault):
-                control.send({"do": "close"})
-            control.close()
+            with deferred():
+                with contextlib.suppress(RobotFault):
+                    control.send({"do": "close"})
+                control.close()
 
-    def _start_reading(self) -> None:
+    def _start_reading(self, start_s: float) -> None:
         if self._reading is not None and self._reading.alive:
             return
         self._newest, self._fault = None, None
         arguments = [self.host, str(self._rate_hz)]
         self._reading = ChildProcess("truepath.robot_link.reading_child", arguments, self._receive)
-        if not wait_for(lambda: self._newest is not None or self._is_lost(), max(START_S, self.timeout_s)):
+        if not wait_for(lambda: self._newest is not None or self._is_lost(), start_s):
             self._reading.kill()
-            raise RobotFault(f"{self.host} does not answer: no data within {max(START_S, self.timeout_s):.0f} s")
+            raise RobotFault(f"{self.host} does not answer: no data within {start_s:.0f} s")
         if self._is_lost():
             raise RobotFault(f"{self.host} cannot be read: {self._fault or self._reading.last_words()}")
 

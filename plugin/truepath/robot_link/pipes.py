@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
@@ -31,13 +32,34 @@ class Pipes:
 
     def say(self, message: dict[str, Any]) -> None:
         """Sends a message. Ends the process if the parent has gone: nobody is left to work for."""
+        if not self.is_heard(message):
+            os._exit(0)
+
+    def is_heard(self, message: dict[str, Any]) -> bool:
+        """Sends a message; whether there still is somebody to read it."""
         try:
             self._answers.write(json.dumps(message) + "\n")
             self._answers.flush()
         except (BrokenPipeError, ValueError):
-            os._exit(0)
+            return False
+        return True
 
-    def requests(self) -> Iterator[dict[str, Any]]:
-        """What the parent asks for, until it closes the pipe or dies."""
-        for line in sys.stdin:
-            yield json.loads(line)
+    def requests(
+        self, meanwhile: Callable[[], Any] = lambda: None, every_s: float | None = None
+    ) -> Iterator[dict[str, Any]]:
+        """What the parent asks for, until it closes the pipe or dies.
+
+        Args:
+            meanwhile: called while nothing is asked for.
+            every_s: how often; None for never.
+        """
+        unread = b""
+        while True:
+            if not select.select([sys.stdin], [], [], every_s)[0]:
+                meanwhile()
+                continue
+            part = os.read(sys.stdin.fileno(), 65536)
+            if not part:
+                return
+            *lines, unread = (unread + part).split(b"\n")
+            yield from (json.loads(line) for line in lines)

@@ -18,27 +18,37 @@ MODES = {
     7: "running",
     8: "updating firmware",
 }
+REMOTE = {"true": True, "false": False}
+NOT_KNOWN = "could not understand"
 
 
 def require_ready(link: RobotLink) -> RobotState:
     """The state of a robot that is able to move and lets itself be moved from here.
 
     Raises:
-        RobotFault: it is not: safety, robot mode, or local control, where the dashboard tells (CB3 does not know it).
+        RobotFault: it is not: safety, robot mode, or local control, where the dashboard knows the question (CB3 does
+            not); a dashboard that is silent.
     """
     state = link.state()
     if state.safety not in ABLE_TO_MOVE:
         raise RobotFault(f"the robot cannot move: safety status {state.safety.replace('_', ' ')}")
     if state.robot_mode != RUNNING_MODE:
         raise RobotFault(f"the robot cannot move: robot mode {MODES.get(state.robot_mode, state.robot_mode)}")
-    if is_in_local_control(link):
+    if is_in_remote_control(link) is False:
         raise RobotFault("the robot is in local control: switch to remote control on the teach pendant")
     return state
 
 
-def is_in_local_control(link: RobotLink) -> bool:
-    """Whether the dashboard says that only the pendant may move the robot; a silent one says nothing."""
-    try:
-        return link.dashboard("is in remote control").strip().lower() == "false"
-    except RobotFault:
-        return False
+def is_in_remote_control(link: RobotLink) -> bool | None:
+    """Whether others than the pendant may move the robot; None if the dashboard says that it does not know the
+    question, as that of CB3 and of old PolyScope does.
+
+    Raises:
+        RobotFault: it does not answer in time, or something else.
+    """
+    answer = link.dashboard("is in remote control").strip()
+    if answer.lower() in REMOTE:
+        return REMOTE[answer.lower()]
+    if answer.lower().startswith(NOT_KNOWN):
+        return None
+    raise RobotFault(f"the dashboard does not say whether the robot is in remote control, but {answer[:80]!r}")

@@ -11,7 +11,7 @@ import numpy as np
 from truepath.lie import Array
 
 RUNNING_MODE = 7  # robot_mode RUNNING of the RTDE guide: power on, brakes released
-PLAYING = 2  # runtime_state of a program that runs
+ENDED = (0, 1)  # runtime_state stopping, stopped; a program that is pausing, paused or resuming is not over
 SAFETY_MODES = {
     1: "normal",
     2: "reduced",
@@ -52,7 +52,7 @@ class RobotState:
         robot_mode: as in the RTDE guide, 7 when the robot is able to move.
         safety: normal, reduced, protective_stop, recovery, safeguard_stop, emergency_stop, violation, fault,
             safety_stop or unknown.
-        program_running: whether any program runs on the controller.
+        program_running: whether there is a program on the controller that has begun and not ended; it may be paused.
         speed_fraction: by how much the speed slider slows moves down, 1 for not at all.
         payload_kg, payload_cog_m: None from a controller older than PolyScope 5.11, which does not tell.
     """
@@ -90,7 +90,7 @@ def from_sample(sample: Mapping[str, Any], tcp_offset: Array | None = None) -> R
         tcp_pose=np.array(sample["tcp_pose"]),
         robot_mode=int(sample["robot_mode"]),
         safety=safety_of(int(sample["safety_mode"]), int(sample["safety_bits"])),
-        program_running=int(sample["runtime_state"]) == PLAYING,
+        program_running=int(sample["runtime_state"]) not in ENDED,
         speed_fraction=float(sample["speed_fraction"]),
         payload_kg=sample["payload_kg"],
         payload_cog_m=None if cog is None else np.array(cog),
