@@ -15,7 +15,7 @@ demo: $(READY)
 	$(BIN)/truepath demo
 
 test: lint browser
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -37,6 +37,8 @@ slow: $(READY)
 	$(BIN)/python workflows/hidden_effects.py
 	$(BIN)/python workflows/path_accuracy.py
 	$(BIN)/python workflows/fuzz_programs.py --count 5000
+	$(BIN)/python workflows/plan_study.py --seeds 50
+	$(BIN)/python workflows/record_faults.py --runs 200
 	$(BIN)/pytest -m slow
 
 $(READY): pyproject.toml constraints.txt

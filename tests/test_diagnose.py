@@ -41,7 +41,7 @@ def diagnosis(real_ur5, measured):
 @pytest.fixture(scope="module")
 def nothing(real_ur5):
     """Of a robot that has nothing but wrong geometry."""
-    return diagnose(real_ur5.robot, Hidden(real_ur5, none).measured(POSES, 31), spec="ur5")
+    return diagnose(real_ur5.robot, Hidden(real_ur5, none).measured(POSES, 31), spec="ur5", plan=False)
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_visits_of_one_pose_are_all_seen_or_all_unseen(real_ur5, softened):
     visits = np.tile(np.arange(60), 3)
     again = once.subset(visits)
     noise = np.random.default_rng(4).normal(scale=2e-5, size=(180, 3))
-    found = diagnose(real_ur5.robot, replace(again, p_ME=again.p_ME + noise, pose_id=visits, line=np.arange(180) + 2))
+    found = diagnose(real_ur5.robot, replace(again, p_ME=again.p_ME + noise, pose_id=visits, line=np.arange(180) + 2), plan=False)
     for pose in range(60):
         assert len(set(found.unseen[visits == pose])) == 1
     assert found.unexplained.floor_from == "repeats"

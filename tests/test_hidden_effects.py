@@ -75,7 +75,7 @@ class TestDiagnosis:
     )
     def test_admits_a_doubt_and_settles_it_with_the_poses_that_it_asked_for(self, design, seed):
         case = draw_case(f"confounded:{design}", seed, outliers=False)
-        diagnosis, verdict = diagnose_csv(case.spec, case.csv)
+        diagnosis, verdict = diagnose_csv(case.spec, case.csv, plan=True)
         truth = case.unseal()
         assert says_ambiguous(verdict, truth)
         further = poses_to_measure(diagnosis, truth)

@@ -205,7 +205,7 @@ def run_case(case: Case) -> Outcome:
 def judge(outcome: Outcome, case: Any) -> None:
     """Fills in what became of a case."""
     said = hidden("verdict")
-    diagnosis, verdict = said.diagnose_csv(case.spec, case.csv)
+    diagnosis, verdict = said.diagnose_csv(case.spec, case.csv, plan=True)
     outcome.verdict = verdict
     truth = case.unseal()
     found = said.named(verdict, truth)

@@ -24,8 +24,8 @@ PHYSICAL = {
 }
 
 
-def diagnose_csv(spec, csv):
-    """The diagnosis of a CSV text, and its verdict as others read it."""
+def diagnose_csv(spec, csv, plan=False):
+    """The diagnosis of a CSV text, with what to measure next or without, and its verdict as others read it."""
     from truepath.diagnose import diagnose
 
     robot = load_robot(spec)
@@ -33,7 +33,7 @@ def diagnose_csv(spec, csv):
         path = Path(folder) / "data.csv"
         path.write_text(csv)
         measurements = read_measurements(path, robot)
-    diagnosis = diagnose(robot, measurements, spec=spec)
+    diagnosis = diagnose(robot, measurements, spec=spec, plan=plan)
     return diagnosis, json.loads(json.dumps(diagnosis.to_dict(), allow_nan=False))
 
 

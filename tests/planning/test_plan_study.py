@@ -9,6 +9,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "workflows"))
 import plan_study
 
 
+@pytest.mark.slow
 def test_planned_poses_leave_a_smaller_tool_error_than_random_ones_of_the_same_test(anywhere):
     result = plan_study.study(
         plan_study.SETTINGS[plan_study.NAMED], 3, candidates=200, fresh_poses=100, everywhere=anywhere
