@@ -155,7 +155,9 @@ def test_visits_of_one_pose_are_all_seen_or_all_unseen(real_ur5, softened):
     visits = np.tile(np.arange(60), 3)
     again = once.subset(visits)
     noise = np.random.default_rng(4).normal(scale=2e-5, size=(180, 3))
-    found = diagnose(real_ur5.robot, replace(again, p_ME=again.p_ME + noise, pose_id=visits, line=np.arange(180) + 2), plan=False)
+    found = diagnose(
+        real_ur5.robot, replace(again, p_ME=again.p_ME + noise, pose_id=visits, line=np.arange(180) + 2), plan=False
+    )
     for pose in range(60):
         assert len(set(found.unseen[visits == pose])) == 1
     assert found.unexplained.floor_from == "repeats"

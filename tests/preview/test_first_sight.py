@@ -50,7 +50,9 @@ def first_sight(browser, tmp_path_factory):
 
 
 def test_make_demo_is_that_command():
-    plan = subprocess.run(["make", "--no-print-directory", "-n", "demo"], cwd=ROOT, capture_output=True, text=True, check=True)
+    plan = subprocess.run(
+        ["make", "--no-print-directory", "-n", "demo"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert plan.stdout.strip().splitlines()[-1] == ".venv/bin/truepath demo"
 
 
