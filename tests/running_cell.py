@@ -12,14 +12,6 @@ import numpy as np
 from PIL import Image
 
 WORKFLOW = Path(__file__).parents[1] / "workflows" / "cell.py"
-CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM_OPTIONS = [
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",  # WebGL without a graphics card
-    "--enable-unsafe-swiftshader",
-]
 SCREEN = {"width": 900, "height": 500}  # drawn by the processor: every pixel counts
 PATIENCE_S = 90.0
 WRIST = "['truepath', 'ur5', '{arm}', 'ur5', 'wrist_3_link']"

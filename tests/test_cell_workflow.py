@@ -1,9 +1,7 @@
 """The reference host as an operator has it: started by one command, worked in a real browser, ended by Ctrl-C."""
 
 import importlib.util
-import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -11,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from running_cell import CHROMIUM_NAMES, CHROMIUM_OPTIONS, CORNERS_ON_SCREEN, PATIENCE_S, SCREEN, WORKFLOW, Running, Tab
+from chromium import DRAWING, headless
+from running_cell import CORNERS_ON_SCREEN, PATIENCE_S, SCREEN, WORKFLOW, Running, Tab
 
 SCRIPT = """def p():
   movej([0, -1.5708, 1.5708, -1.5708, -1.5708, 0])
@@ -45,18 +44,9 @@ def running(script):
 
 @pytest.fixture(scope="module")
 def browser():
-    """A headless Chromium that can draw. Without one there is nothing to test, except where CI promises one."""
-    executable = next(filter(None, map(shutil.which, CHROMIUM_NAMES)), None)
-    if executable is None:
-        reason = "no Chromium on this machine: looked for " + ", ".join(CHROMIUM_NAMES)
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=executable, args=CHROMIUM_OPTIONS)
+    """That can draw."""
+    with headless(DRAWING) as chromium:
         yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

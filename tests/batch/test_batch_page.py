@@ -5,6 +5,7 @@ import re
 from html.parser import HTMLParser
 
 import pytest
+from chromium import headless
 from small_programs import BY_SENSOR, NOTHING_MOVES, OUT_OF_REACH
 from truepath.batch.page import MEANINGS, SIGNS, render
 from truepath.batch.summary import STATUSES
@@ -107,18 +108,8 @@ def test_nothing_moves():
 
 @pytest.fixture(scope="module")
 def browser():
-    """A page in Chromium; skipped where there is none."""
-    import shutil
-
-    from playwright.sync_api import sync_playwright
-
-    executable = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if executable is None:
-        pytest.skip("no Chromium")
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox"])
-        yield started
-        started.close()
+    with headless() as chromium:
+        yield chromium
 
 
 def test_a_person_can_sort_and_filter(batch, programs, calibration, browser):

@@ -1,13 +1,12 @@
 """A calibration, a path and a browser that the tests of the preview share."""
 
 import csv
-import os
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from opened_page import CHROMIUM_NAMES, CHROMIUM_OPTIONS, UNKIND, OpenPage
+from chromium import DRAWING, headless
+from opened_page import UNKIND, OpenPage
 from truepath import lie, poe
 from truepath.calibration import Calibration
 from truepath.learn import learn
@@ -57,18 +56,9 @@ def page_file(tmp_path_factory, calibration, q_programmed, q_corrected) -> Path:
 
 @pytest.fixture(scope="module")  # a second one, of the tests of another page, cannot be open at the same time
 def browser():
-    """A headless Chromium that can draw. Without one there is nothing to test, except where CI promises one."""
-    executable = next(filter(None, map(shutil.which, CHROMIUM_NAMES)), None)
-    if executable is None:
-        reason = "no Chromium on this machine: looked for " + ", ".join(CHROMIUM_NAMES)
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=executable, args=CHROMIUM_OPTIONS)
+    """That can draw."""
+    with headless(DRAWING) as chromium:
         yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

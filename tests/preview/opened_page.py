@@ -6,14 +6,6 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM_OPTIONS = [
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",  # WebGL without a graphics card
-    "--enable-unsafe-swiftshader",
-]
 LAPTOP, DESKTOP, PHONE = (dict(width=w, height=h) for w, h in ((1366, 768), (1920, 1080), (390, 844)))
 VERMILLION, BLUE = (0xD5, 0x5E, 0x00), (0x00, 0x72, 0xB2)
 UNKIND = "</script><script>document.title='broken'</script> & <b>\"bold\"</b> <!--"

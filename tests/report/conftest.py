@@ -1,13 +1,9 @@
 """Reports of diagnoses that were made up, and a browser to open them in."""
 
-import os
-import shutil
-
 import made_up
 import pytest
+from chromium import headless
 from truepath.report import write_report
-
-CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
 
 @pytest.fixture(scope="session")
@@ -49,15 +45,5 @@ def unkind_file(written):
 
 @pytest.fixture(scope="module")
 def browser():
-    """A headless Chromium. Without one there is nothing to test, except where CI promises one."""
-    executable = next(filter(None, map(shutil.which, CHROMIUM_NAMES)), None)
-    if executable is None:
-        reason = "no Chromium on this machine: looked for " + ", ".join(CHROMIUM_NAMES)
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+    with headless() as chromium:
         yield chromium
-        chromium.close()
