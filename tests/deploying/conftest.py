@@ -7,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from truepath.calibration import load_calibration
+from truepath.controller import controller_of
+from truepath.deploying.rehearsal import rehearse
+from truepath.deploying.rehearsed_way import rehearsed_way
 from truepath.learn import learn
 from truepath.rewriting.options import RewriteOptions
 from truepath.rewriting.rewrite import rewrite_program
@@ -79,6 +82,18 @@ def weld(corrected):
 def slow(corrected):
     """Goes on for a minute of the robot's time."""
     return corrected(SLOW, name="slow.script")
+
+
+@pytest.fixture(scope="session")
+def way_of(ur5):
+    """Function: where the joints go in a program that starts from where they are, without a tool."""
+    believed = controller_of(ur5)
+
+    def way_of(text, q_start_rad=HOME):
+        start = np.array(q_start_rad)
+        return rehearsed_way(rehearse(text, believed, start, [0.0] * 6), believed, start)
+
+    return way_of
 
 
 @pytest.fixture(scope="module")

@@ -229,10 +229,10 @@ def test_ctrl_c_stops_the_robot(controller, slow, calibration, link):
     assert controller.command({"do": "state"})["program"] is None
 
 
-def test_a_robot_that_only_stands_is_stopped(controller, link):
-    passages = Passages(np.zeros((0, 6)), np.zeros(0))
+def test_a_robot_that_only_stands_is_stopped(controller, link, way_of):
+    waits, passages = "def waits():\n  sleep(1000)\nend\n", Passages(np.zeros((0, 6)), np.zeros(0))
     with RunFile(None) as nothing:
-        followed = send_and_follow(link, "def waits():\n  sleep(1000)\nend\n", passages, nothing, 0.4, lambda *_: None)
+        followed = send_and_follow(link, waits, passages, way_of(waits), nothing, 0.4, lambda *_: None)
     assert "has stood" in followed.ended
     assert not followed.completed
     assert controller.command({"do": "state"})["program"] is None

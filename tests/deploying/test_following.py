@@ -20,7 +20,17 @@ SHORT = "def short():\n  movej([0.15, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=0.
 MOVES_RAD = 0.02
 
 
-def followed(link, text, when_it_moves):
+@pytest.fixture
+def followed(way_of):
+    """Function: how a program went, something having been done when the robot moved."""
+
+    def followed(link, text, when_it_moves, rehearsed=None):
+        return follow(link, text, way_of(rehearsed or text), when_it_moves)
+
+    return followed
+
+
+def follow(link, text, way, when_it_moves):
     acted = []
 
     def watched(passed, state):
@@ -29,7 +39,8 @@ def followed(link, text, when_it_moves):
             when_it_moves()
 
     with RunFile(None) as nothing:
-        return send_and_follow(link, text, Passages(np.zeros((0, 6)), np.zeros(0)), nothing, 5.0, watched)
+        no_targets = Passages(np.zeros((0, 6)), np.zeros(0))
+        return send_and_follow(link, text, no_targets, way, nothing, 5.0, watched)
 
 
 def is_over(controller, within_s=0.0):
@@ -41,7 +52,7 @@ def is_over(controller, within_s=0.0):
     return state["program"] is None and now["commanded_q_rad"] == state["commanded_q_rad"]
 
 
-def test_a_pause_is_not_the_end(controller, link):
+def test_a_pause_is_not_the_end(controller, link, followed):
     paused = []
 
     def pause():
@@ -55,7 +66,9 @@ def test_a_pause_is_not_the_end(controller, link):
     assert controller.command({"do": "state"})["commanded_q_rad"][0] == pytest.approx(0.15)
 
 
-def test_a_dashboard_that_refuses_and_an_impatient_person_do_not_keep_the_robot_going(controller, link, monkeypatch):
+def test_a_dashboard_that_refuses_and_an_impatient_person_do_not_keep_the_robot_going(
+    controller, link, followed, monkeypatch
+):
     monkeypatch.setattr(RobotLink, "_stop_by_dashboard", lambda self: "Failed to execute: stop")
 
     def ctrl_c_again_and_again():
@@ -70,7 +83,7 @@ def test_a_dashboard_that_refuses_and_an_impatient_person_do_not_keep_the_robot_
     assert controller.command({"do": "state"})["commanded_q_rad"][0] < 1.4
 
 
-def test_what_obeys_nobody_is_told_as_it_is(controller, link, monkeypatch):
+def test_what_obeys_nobody_is_told_as_it_is(controller, link, followed, monkeypatch):
     for way in ("_stop_by_dashboard", "_stop_by_program", "_stop_by_control"):
         monkeypatch.setattr(RobotLink, way, lambda self: "Stopped")
     monkeypatch.setattr("truepath.robot_link.link.STOP_LIMIT_S", 0.0)
@@ -99,7 +112,7 @@ def test_a_program_whose_watcher_was_killed_is_stopped(controller, link):
     assert controller.command({"do": "state"})["commanded_q_rad"][0] < 1.4
 
 
-def test_nothing_is_sent_while_the_dashboard_is_silent(controller, link, monkeypatch):
+def test_nothing_is_sent_while_the_dashboard_is_silent(controller, link, followed, monkeypatch):
     def silent(self, question):
         raise RobotFault(f"the dashboard does not answer {question!r}")
 
@@ -107,3 +120,13 @@ def test_nothing_is_sent_while_the_dashboard_is_silent(controller, link, monkeyp
     with pytest.raises(RobotFault, match="is in remote control"):
         followed(link, FAR, lambda: None)
     assert controller.moves() == 0
+
+
+def test_a_robot_that_leaves_the_rehearsed_way_is_stopped(controller, link, followed):
+    other_way_round = FAR.replace("[1.5,", "[-1.5,")
+    outcome = followed(link, other_way_round, lambda: None, rehearsed=FAR)
+    assert "has left the way" in outcome.ended
+    assert "joint 1" in outcome.ended
+    assert outcome.ended.endswith("it was told to stop and stands")
+    assert not outcome.completed
+    assert -0.4 < controller.command({"do": "state"})["commanded_q_rad"][0] < -0.05

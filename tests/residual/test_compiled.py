@@ -20,10 +20,10 @@ def logistic(z):
 
 
 def test_the_logistic_function_is_wrong_by_as_little_as_is_said():
-    z = np.r_[np.linspace(-40, 40, 200_001), 16.2 + np.linspace(-1e-3, 1e-3, 999), 1e30, -1e30].astype(np.float32)
+    z = np.r_[np.linspace(-40, 40, 200_001), 14.0 + np.linspace(-1e-3, 1e-3, 999), 1e30, -1e30].astype(np.float32)
     error = np.abs(logistic(z) - expit(z.astype(float)))
     squaring = np.finfo(np.float32).eps / 2  # what looking at the square of it adds
-    assert error.max() < 3e-7 + squaring
+    assert error.max() < 7e-7 + squaring
 
 
 def test_chance_is_that_of_splitmix64():

@@ -26,6 +26,7 @@ from truepath.deploying.load import Load, calibrated_load
 from truepath.deploying.outcome import Outcome, outcome_of
 from truepath.deploying.passages import Passages
 from truepath.deploying.rehearsal import Rehearsal, rehearse
+from truepath.deploying.rehearsed_way import rehearsed_way
 from truepath.deploying.run_file import RunFile
 from truepath.deploying.sent_program import SentProgram, read_program, require_correction, robot_remarks
 from truepath.deploying.settings import Settings, settings_in
@@ -174,10 +175,11 @@ def run(prepared: Prepared, link: RobotLink, record: Path | None, watched: Watch
     """
     rehearsal = prepared.rehearsal
     passages = Passages(rehearsal.q_rad, rehearsal.blend_m)
+    way = rehearsed_way(rehearsal, prepared.controller, prepared.state.q_rad)
     _require_still_ready(prepared, link)
     with RunFile(record) as rows:  # not before: a run that does not begin must not cost an older record
         stall_s = max(LEAST_STALL_S, TIMES_THE_WAIT * rehearsal.longest_wait_s)
-        followed: Followed = send_and_follow(link, prepared.program.sent, passages, rows, stall_s, watched)
+        followed: Followed = send_and_follow(link, prepared.program.sent, passages, way, rows, stall_s, watched)
     return outcome_of(rehearsal, followed, passages, prepared.calibration, prepared.controller)
 
 

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from truepath.deploying.passages import Passages
+from truepath.deploying.rehearsed_way import RehearsedWay
 from truepath.deploying.run_file import RunFile
 from truepath.lie import Array
 from truepath.robot_link import RobotFault, RobotLink, RobotState
@@ -57,7 +58,13 @@ class Followed:
 
 
 def send_and_follow(
-    link: RobotLink, text: str, passages: Passages, record: RunFile, stall_s: float, watched: Watched
+    link: RobotLink,
+    text: str,
+    passages: Passages,
+    way: RehearsedWay,
+    record: RunFile,
+    stall_s: float,
+    watched: Watched,
 ) -> Followed:
     """Runs a program on a robot that was found ready.
 
@@ -67,6 +74,7 @@ def send_and_follow(
         link: to the robot.
         text: of the program.
         passages: of its targets.
+        way: on which it must stay.
         record: gets every sample.
         stall_s: the robot may stand for so long while its program runs.
         watched: is told how it goes.
@@ -76,7 +84,7 @@ def send_and_follow(
     """
     if is_in_remote_control(link) is False:
         raise RobotFault("the robot is in local control: it can be stopped from the teach pendant only")
-    run, sent = _Run(link, passages, record, watched), False
+    run, sent = _Run(link, passages, way, record, watched), False
     link.state()
     link.samples()
     with Guard(link.host) as guard:
@@ -103,10 +111,13 @@ def send_and_follow(
 
 
 class _Run:
-    def __init__(self, link: RobotLink, passages: Passages, record: RunFile, watched: Watched) -> None:
-        self.link, self.passages, self.record, self.watched = link, passages, record, watched
+    def __init__(
+        self, link: RobotLink, passages: Passages, way: RehearsedWay, record: RunFile, watched: Watched
+    ) -> None:
+        self.link, self.passages, self.way, self.record, self.watched = link, passages, way, record, watched
         self.followed = Followed()
         self.stands = False
+        self.strayed: str | None = None
         self.started_s: float | None = None
         self.q_target: Array | None = None
         self.moved_s = time.monotonic()
@@ -140,7 +151,7 @@ class _Run:
         """Takes in what has arrived.
 
         Raises:
-            RobotFault: the robot was stopped, or is lost.
+            RobotFault: the robot was stopped, is lost, or goes where it was not to go.
         """
         time.sleep(LOOK_EVERY_S)
         try:
@@ -150,6 +161,8 @@ class _Run:
         self.take(samples)
         if not state.able_to_move:
             raise RobotFault(_why_unable(state))
+        if self.strayed is not None:
+            raise RobotFault(self.strayed)
         return state
 
     def take(self, samples: list[RobotState]) -> None:
@@ -170,6 +183,8 @@ class _Run:
         if self.started_s is not None:
             if running.any():
                 followed.duration_s = float(time_s[running][-1]) - self.started_s
+            if self.strayed is None and running.any() and self.way.holds(self.passages.count):
+                self.strayed = self.way.strayed(q[running])
             self.passages.take(time_s, q)
         if self.q_target is None or np.abs(q_target - self.q_target).max() > MOVED_RAD:
             self.moved_s = time.monotonic()

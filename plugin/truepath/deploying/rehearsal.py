@@ -21,6 +21,7 @@ from truepath.virtual.controller.script_runner import run_script
 from truepath.virtual.controller.script_values import matrix
 
 MOST_TARGETS, MOST_INSTRUCTIONS = 20_000, 200_000
+NOWHERE = (np.nan,) * 3
 MOST_TURNS = 50  # to the same joints in the same line: a loop that may well be endless
 
 
@@ -33,6 +34,8 @@ class Rehearsal:
         q_rad: ``(N, 6)`` joints there, as the controller finds them.
         X_0T: ``(N, 4, 4)`` tool in force.
         is_pose: ``(N,)`` True where the program states a pose.
+        p_via: ``(N, 3)`` point in C that an arc passes on its way to the target, m; NaN for all other ways.
+        turns_along: ``(N,)`` True where the tool turns along with the arc.
         payloads: set by the program, in order.
         longest_wait_s: in one piece.
         open_end: why nobody knows what follows; None if this is all of it.
@@ -44,6 +47,8 @@ class Rehearsal:
     q_rad: Array
     X_0T: Array
     is_pose: Array
+    p_via: Array
+    turns_along: Array
     payloads: tuple[SetPayload, ...]
     longest_wait_s: float
     open_end: str | None
@@ -128,6 +133,8 @@ def rehearse(text: str, controller: Controller, q_start_rad: Array, tool: Sequen
         q_rad=np.array([move.q_rad for move in moves], float).reshape(-1, 6),
         X_0T=np.array([matrix(move.tool) for move in moves]).reshape(-1, 4, 4),
         is_pose=np.array([move.stated_as_pose for move in moves], bool),
+        p_via=np.array([NOWHERE if move.via is None else move.via[:3] for move in moves], float).reshape(-1, 3),
+        turns_along=np.array([move.follows_orientation for move in moves], bool),
         payloads=tuple(payloads),
         longest_wait_s=longest,
         open_end=open_end,
