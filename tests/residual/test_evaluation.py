@@ -29,7 +29,7 @@ def arguments(networks, x, target, precision=np.float64):
 
 
 @pytest.mark.parametrize(("precision", "tolerance"), [(np.float64, 1e-12), (np.float32, 1e-5)])
-@pytest.mark.parametrize("samples", [1, 11, 256, 300])
+@pytest.mark.parametrize("samples", [1, 11, 1024, 1025, 2060])
 def test_squared_misses_are_those_of_each_network_alone(samples, precision, tolerance):
     networks, x, target = drawn([7, 1, 2, 8, 5], samples)
     found = squared_misses(*arguments(networks, x, target, precision))

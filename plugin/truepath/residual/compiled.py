@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-BLOCK = 512  # poses at a time, a multiple of every vector register: what they need stays in the fastest cache
+LANES = 16  # numbers in single precision in the widest vector register
 
 # tanh(w) is about SCALE w P(w^2) / Q(w^2) for |w| <= LIMIT; P and Q from their constants up, the highest is 1.
 LIMIT = np.float32(7.0)
@@ -71,16 +71,18 @@ def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
 
     Args of the kernel:
         genes, bias, sizes: ``(P, L, d + 1 + k)``, ``(P, k)``, ``(P,)`` as a population has them.
-        x, target: ``(B, d BLOCK)``, ``(B, k BLOCK)``: a row per block of poses, each quantity's numbers together.
+        x, target: ``(B, d S)``, ``(B, k S)``: a row per block of S poses, each quantity's numbers together. S is
+            divisible by LANES, and small enough for the fastest cache.
         poses: how many there are; the last block may have more room.
         found: ``(P,)``.
-        miss: ``(k BLOCK,)`` to work in. Like ``x`` and ``target`` it should begin where a line of the cache does.
+        miss: ``(k S,)`` to work in. Like ``x`` and ``target`` it should begin where a line of the cache does.
     """
-    block, half, width = BLOCK, precision(0.5), inputs + 1 + outputs
+    half, width = precision(0.5), inputs + 1 + outputs
     middle, single = inputs // 2, precision is np.float32
     scale = precision(0.5 * SCALE if single else 0.5)
 
     def kernel(genes, bias, sizes, x, target, poses, found, start, stop, miss):  # type: ignore[no-untyped-def]
+        block = np.uint64(len(miss) // outputs)
         constants = np.empty(outputs, precision)
         scaled = np.empty((genes.shape[1] + 1, width), precision)
         for who in range(start, stop):
@@ -121,7 +123,7 @@ def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
                             so_far = miss[k * block + n] + first[inputs + 1 + k] * one
                             miss[k * block + n] = so_far + second[inputs + 1 + k] * other
                 for k in range(outputs):
-                    total += _sum_of_squares(miss, k * block, k * block + min(block, poses - part * block))
+                    total += _sum_of_squares(miss, k * block, k * block + min(block, np.uint64(poses) - part * block))
             found[who] = total
 
     return compiled(kernel, fastmath=FAST)
@@ -141,7 +143,7 @@ def _unify(genes, length, seed, number, unified):  # type: ignore[no-untyped-def
     """Truncates the genes or continues them at random, from the so-many-th number of the seed on."""
     for n in range(min(length, len(unified))):
         unified[n] = genes[n]
-    for n in range(length, len(unified)):
+    for n in range(np.uint64(length), np.uint64(len(unified))):  # the compiler need not think of negative ones
         unified[n] = 2.0 * _chance(seed, number + n) - 1.0
 
 
@@ -155,9 +157,9 @@ def _cross(own, length, best, one, other, factor, crossover, seed, number, trial
 
 @cache
 def trials() -> Kernel:
-    """The kernel ``(genes, bias, sizes, width, best, factor, crossover, seeds, trial, trial_bias)``, eq. 19 and 20.
+    """The kernel that makes trials, eq. 19 and 20; ``evolution.trials`` says what they are.
 
-    It writes trials of the best one's size into the last two; ``evolution.trials`` says what they are.
+    It writes them into ``trial[start:stop]`` and ``trial_bias[start:stop]``, in the best one's size.
 
     Args of the kernel:
         genes, bias, sizes: ``(P, L (d + 1 + k))``, ``(P, k)``, ``(P,)``: all neurons of an individual in one row.
@@ -167,11 +169,13 @@ def trials() -> Kernel:
         trial, trial_bias: like ``genes`` and ``bias``; beyond the size of the best nothing is written.
     """
 
-    def kernel(genes, bias, sizes, width, best, factor, crossover, seeds, trial, trial_bias):  # type: ignore[no-untyped-def]
+    def kernel(  # type: ignore[no-untyped-def]
+        genes, bias, sizes, width, best, factor, crossover, seeds, trial, trial_bias, start, stop
+    ):
         count, outputs = bias.shape
         length = sizes[best] * width
         one, other = np.empty(length, genes.dtype), np.empty(length, genes.dtype)
-        for who in range(count):
+        for who in range(start, stop):
             seed = seeds[who]
             a = int(_chance(seed, 0) * count)
             b = (a + 1 + int(_chance(seed, 1) * (count - 1))) % count

@@ -13,13 +13,22 @@ import numpy as np
 
 from truepath.lie import Array
 
-AT_ONCE = 20  # networks: enough for a thread to do, few enough for the last one to be done soon after the others
+AT_ONCE = 25  # networks: enough for a thread to do, few enough for the last one to be done soon after the others
+MOST_POSES = 1024  # in a block: what they need stays near the processor
 LINE_BYTES = 64  # of the cache: a vector register that lies across two of them takes twice as long to load
 
 Item = TypeVar("Item")
 
 
-def squared_misses(genes: Array, bias: Array, sizes: Array, x1: Array, target: Array, threads: int = 1) -> Array:
+def squared_misses(
+    genes: Array,
+    bias: Array,
+    sizes: Array,
+    x1: Array,
+    target: Array,
+    threads: int = 1,
+    make: Callable[[int, int], None] | None = None,
+) -> Array:
     """``(P,)`` squared misses of P networks, summed over samples and outputs, in the precision of the arguments.
 
     Args:
@@ -27,17 +36,21 @@ def squared_misses(genes: Array, bias: Array, sizes: Array, x1: Array, target: A
         x1: ``(d + 1, N)`` inputs as ``network.with_ones`` makes them.
         target: ``(k, N)``.
         threads: at most so many; the result does not depend on their number.
+        make: writes the genes and biases of the networks from the first number up to the second one into the arrays,
+            just before they are needed; None if they are there. Then the arrays must be contiguous.
     """
     from truepath.residual import compiled
 
     found = np.empty(len(sizes), target.dtype)
     precision: Any = target.dtype.type
-    x, wanted = (_in_blocks(values, compiled.BLOCK) for values in (x1[:-1], target))
+    x, wanted = (_in_blocks(values, compiled.LANES) for values in (x1[:-1], target))
     kernel = compiled.misses(len(x1) - 1, len(target), precision)
     genes, bias = np.ascontiguousarray(genes), np.ascontiguousarray(bias)
 
     def evaluate(start: int) -> None:
         stop = min(start + AT_ONCE, len(sizes))
+        if make is not None:
+            make(start, stop)
         miss = _aligned((wanted.shape[1],), target.dtype)
         kernel(genes, bias, sizes, x, wanted, target.shape[1], found, start, stop, miss)
 
@@ -45,15 +58,16 @@ def squared_misses(genes: Array, bias: Array, sizes: Array, x1: Array, target: A
     return found
 
 
-def _in_blocks(values: Array, size: int) -> Array:
-    """``(B, q size)``: rows of ``(q, N)`` cut into pieces of that size; the last is filled up with zeros."""
+def _in_blocks(values: Array, lanes: int) -> Array:
+    """``(B, q S)``: rows of ``(q, N)`` cut into pieces of equal size, a multiple of ``lanes``; zeros fill the last."""
     rows, count = values.shape
-    blocks = -(-count // size)
+    blocks = -(-count // MOST_POSES)
+    size = lanes * -(-count // (lanes * blocks))
     filled = _aligned((blocks, rows, size), values.dtype)
-    whole, left = divmod(count, size)
-    filled[:whole] = values[:, : whole * size].reshape(rows, whole, size).swapaxes(0, 1)
-    if left:
-        filled[-1, :, :left], filled[-1, :, left:] = values[:, whole * size :], 0.0
+    filled[-1] = 0.0
+    for block, start in enumerate(range(0, count, size)):
+        part = values[:, start : start + size]
+        filled[block, :, : part.shape[1]] = part
     return filled.reshape(blocks, -1)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -11,7 +12,7 @@ import torch
 from truepath.lie import Array
 from truepath.residual.limits import Settings
 from truepath.residual.network import Network, Tensor, with_ones
-from truepath.residual.population import Population, generator_for, uniform
+from truepath.residual.population import Make, Population, generator_for, uniform
 
 WORTH_MENTIONING = 1e-3  # of the error
 
@@ -106,8 +107,8 @@ def next_generation(state: State, x1: Tensor, target: Tensor, settings: Settings
     """Mutation, crossover, greedy selection; from time to time the hidden sizes step."""
     generation = state.generation + 1
     generator = generator_for(seed, generation, x1.device)
-    trial = trials(state.population, state.best, settings, generator)
-    error = trial.mean_squared_error(x1, target, threads)
+    trial, make = _trials_and_maker(state.population, state.best, settings, generator)
+    error = trial.mean_squared_error(x1, target, threads, make)
     better = error < state.error  # eq. 21
     population, error = state.population.where(better, trial), torch.where(better, error, state.error)
     best = float(error.min())
@@ -128,7 +129,24 @@ def trials(population: Population, best: int, settings: Settings, generator: tor
     return (_trials_on_cpu if on_cpu else _trials_on_gpu)(population, best, settings, generator)
 
 
+def _trials_and_maker(
+    population: Population, best: int, settings: Settings, generator: torch.Generator
+) -> tuple[Population, Make | None]:
+    """On a CPU whoever evaluates a trial makes it, so that all threads have their share and it is still at hand."""
+    if population.sizes.device.type == "cpu":
+        return _to_be_made(population, best, settings, generator)
+    return _trials_on_gpu(population, best, settings, generator), None
+
+
 def _trials_on_cpu(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
+    trial, make = _to_be_made(population, best, settings, generator)
+    make(0, len(trial))
+    return trial
+
+
+def _to_be_made(
+    population: Population, best: int, settings: Settings, generator: torch.Generator
+) -> tuple[Population, Make]:
     from truepath.residual import compiled
 
     limits = torch.iinfo(torch.int64)
@@ -137,12 +155,13 @@ def _trials_on_cpu(population: Population, best: int, settings: Settings, genera
     flat, precision = genes.reshape(len(genes), -1), genes.dtype.type
     trial, trial_bias = np.zeros_like(flat), np.empty_like(bias)
     factor, crossover = precision(settings.factor), settings.crossover
-    compiled.trials()(flat, bias, sizes, genes.shape[2], best, factor, crossover, seeds, trial, trial_bias)
-    return Population(
+    arguments = flat, bias, sizes, genes.shape[2], best, factor, crossover, seeds, trial, trial_bias
+    made = Population(
         torch.from_numpy(trial.reshape(genes.shape)),
         torch.from_numpy(trial_bias),
         torch.full_like(population.sizes, int(sizes[best])),
     )
+    return made, partial(compiled.trials(), *arguments)
 
 
 def _trials_on_gpu(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
