@@ -44,13 +44,14 @@ def poses_that_tell(
     feasible = Feasible.within_limits(robot, kinematic.fit.problem.X_FE, _space(kinematic, spec), span_rad=span)
     try:
         feasible = feasible.from_home(rng)
-        drawn = feasible.draw(CANDIDATES, rng)
+        drawn = feasible.draw(CANDIDATES, rng, roughly=True)
         knowledge = Knowledge.of(kinematic, fit, confusion.terms)
         visiting = Visiting(knowledge.model, feasible)
         count = min(POSES, len(drawn) // 2)
         if not count:
             return None
-        chosen = design(visiting, drawn, drawn, Wish(count, 0, "D", local=False), rng, knowledge.information)
+        wish = Wish(count, 0, "D", local=False, compared=False)
+        chosen = design(visiting, drawn, drawn, wish, rng, knowledge.information)
         return in_order(visiting, chosen, Pace(), rng).poses
     except InputError:  # nothing is free, or no way leads there: no reason to withhold a diagnosis
         return None

@@ -58,6 +58,25 @@ def test_the_first_pick_is_the_single_best_and_each_later_one_the_best_given_tho
         assert left(VOLUME, picked[: k + 1]) == pytest.approx(min(others))
 
 
+@pytest.mark.parametrize("criterion", [MEAN_VARIANCE, VOLUME])
+def test_no_gain_exceeds_what_it_is_said_to_be_at_most(criterion):
+    for so_far in (H, H + information(BLOCKS[:6])):
+        assert (criterion.gains(so_far, BLOCKS) <= criterion.most(so_far, BLOCKS) + 1e-12).all()
+
+
+@pytest.mark.parametrize("criterion", [MEAN_VARIANCE, VOLUME])
+def test_what_turns_out_to_be_unusable_is_left_out_as_if_it_had_not_been_offered(criterion):
+    usable = [k for k in range(12) if k % 3]
+    without = BLOCKS[usable]
+    expected = greedy(criterion, H, without, 4)
+    found = greedy(criterion, H, BLOCKS, 4, lambda k: k in usable)
+    assert found == [usable[k] for k in expected]
+    assert len(greedy(criterion, H, BLOCKS, 12, lambda k: k in usable)) == len(usable)
+    start = [1, 2, 4, 5]
+    expected = exchange(criterion, H, without, [usable.index(k) for k in start])
+    assert exchange(criterion, H, BLOCKS, start, lambda k: k in usable) == [usable[k] for k in expected]
+
+
 def test_nothing_is_picked_twice_and_no_more_than_there_are():
     assert sorted(greedy(VOLUME, H, BLOCKS, 50)) == list(range(12))
 

@@ -107,11 +107,11 @@ def plan_campaign(
     require_sense(wish, seed)
     rng = np.random.default_rng(seed)
     say("looking for poses all over the workspace")
-    workspace = feasible.anywhere().draw(WORKSPACE, rng)
+    workspace = feasible.anywhere().draw(WORKSPACE, rng, roughly=True)
     if len(workspace) < LEAST_CANDIDATES:
         raise feasible.anywhere().complain(rng)
     terms, not_planned = planned_terms(feasible.robot, effects, workspace)
-    drawn = feasible.draw(candidates, rng, say)
+    drawn = feasible.draw(candidates, rng, say, roughly=True)
     if len(drawn) < LEAST_CANDIDATES:
         raise feasible.complain(rng)
     model = ReadingModel.nominal(feasible.robot, feasible.X_FE, drawn, terms, sigma)

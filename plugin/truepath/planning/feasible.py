@@ -17,7 +17,7 @@ from truepath.robot import NominalRobot
 
 LIMIT_MARGIN_RAD = np.radians(3.0)
 LEAST_HEIGHT_M = 0.05  # of the reflector above the floor: lower, no tracker sees it
-AT_ONCE, MOST_DRAWN = 20_000, 2_000_000
+AT_ONCE, MOST_DRAWN = 5000, 2_000_000
 ENOUGH_DRAWN = 200_000  # if none of them faces the tracker, none will
 ENOUGH_ASKED, HARDLY_ANY = 2000, 0.003  # of so many that Drake looked at so few passed: no use to go on
 
@@ -96,12 +96,24 @@ class Feasible:
 
     def check(self, q_rad: Array) -> Array:
         """``(N,)`` which of joints ``(N, n)`` can be measured."""
-        passed = self._in_place(q_rad)
-        passed[passed] = self._free(q_rad[passed])
+        passed = self.are_in_place(q_rad)
+        passed[passed] = self.are_possible(q_rad[passed])
         return passed
 
-    def draw(self, count: int, rng: np.random.Generator, say: Progress = lambda _: None) -> Array:
-        """``(k, n)`` random joints that pass, uniform over the joints allowed; fewer than ``count`` where few pass."""
+    def are_possible(self, q_rad: Array) -> Array:
+        """``(N,)`` the rest of the test, for poses that are in place."""
+        passed = self._are_free(q_rad)
+        passed[passed] = self.are_open(q_rad[passed])
+        return passed
+
+    def draw(
+        self, count: int, rng: np.random.Generator, say: Progress = lambda _: None, *, roughly: bool = False
+    ) -> Array:
+        """``(k, n)`` random joints that pass, uniform over the joints allowed; fewer than ``count`` where few pass.
+
+        With ``roughly`` of all but ``are_open``, which costs more than all else: for who looks at that for what he
+        takes.
+        """
 
         def hopeless() -> bool:
             return (drawn >= ENOUGH_DRAWN and not asked) or (asked >= ENOUGH_ASKED and number <= HARDLY_ANY * asked)
@@ -109,13 +121,14 @@ class Feasible:
         found: list[Array] = []
         number = drawn = asked = 0
         while number < count and drawn < MOST_DRAWN and not hopeless():
-            q = rng.uniform(self.lower_rad, self.upper_rad, (AT_ONCE, len(self.lower_rad)))
-            drawn += AT_ONCE
-            q = q[self._in_place(q)]
+            q = rng.uniform(self.lower_rad, self.upper_rad, (min(AT_ONCE, 4 * count), len(self.lower_rad)))
+            drawn += len(q)
+            q = q[self.are_in_place(q)]
             while len(q) and number < count and not hopeless():  # not all: Drake takes its time
                 some, q = np.split(q, [min(200, len(q))])
                 asked += len(some)
-                some = some[self._free(some)]
+                some = some[self._are_free(some)]
+                some = some if roughly else some[self.are_open(some)]
                 found.append(some)
                 number += len(some)
                 say(f"{min(number, count)} of {count} candidates in {drawn} random poses")
@@ -161,22 +174,25 @@ class Feasible:
     def _reflector(self, q_rad: Array) -> Array:
         return self.robot.X_WB @ nominal_flange_poses(self.robot, q_rad) @ self.X_FE
 
-    def _in_place(self, q_rad: Array) -> Array:
-        """``(N,)`` what costs little to know."""
+    def are_in_place(self, q_rad: Array) -> Array:
+        """``(N,)`` the part of the test that asks nothing of Drake: limits, floor, range and cone of the tracker."""
         X_WE = self._reflector(q_rad)
         passed = ((q_rad >= self.lower_rad) & (q_rad <= self.upper_rad)).all(axis=1)
         passed &= X_WE[:, 2, 3] - self.floor_m > LEAST_HEIGHT_M
         return passed if self.sight is None else passed & self.sight.sees(X_WE)
 
-    def _free(self, q_rad: Array) -> Array:
-        """``(N,)`` what has to be asked of Drake."""
+    def are_open(self, q_rad: Array) -> Array:
+        """``(N,)`` for poses that pass all else: whether a way leads there, and nothing is in the tracker's beam."""
+        passed = np.ones(len(q_rad), bool)
         if self.space is None:
-            return np.ones(len(q_rad), bool)
-        free = self.space.are_free(q_rad)
+            return passed
         if self.roadmap is not None:
-            free[free] = self.roadmap.reaches(q_rad[free])
+            passed = self.roadmap.reaches(q_rad)
         if self.sight is not None:
             p_WE = self._reflector(q_rad)[:, :3, 3]
-            for k in np.flatnonzero(free):
-                free[k] = self.space.beam_is_unbroken(q_rad[k], p_WE[k], self.sight.p_WT)
-        return free
+            for k in np.flatnonzero(passed):
+                passed[k] = self.space.beam_is_unbroken(q_rad[k], p_WE[k], self.sight.p_WT)
+        return passed
+
+    def _are_free(self, q_rad: Array) -> Array:
+        return np.ones(len(q_rad), bool) if self.space is None else self.space.are_free(q_rad)

@@ -1,25 +1,24 @@
 """Where the arm may be and which way it may go: free of collision with a margin, the beam of the tracker unbroken.
 
-Everything is asked of Drake through ``clearance.Cell``. Shapes of neighbouring links are nearer to each other than any
-margin by their design: for pairs of bodies that are so in most postures only touching counts.
+Everything is asked of Drake, through ``roomy.RoomyCell``. Shapes of neighbouring links are nearer to each other than
+any margin by their design: for pairs of bodies that are so in most postures only touching counts.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from truepath.clearance import Cell
 from truepath.lie import Array
 from truepath.model import CalibratedModel
+from truepath.planning.roomy import RoomyCell
 
 MARGIN_M = 0.02  # between the arm and what it must not touch, at poses
 ON_THE_WAY = 0.5  # of it on ways, or there would be none away from a pose that just keeps it
-COARSE_RAD, FINE_RAD = 0.08, 0.02  # steps of the fastest joint
-NEIGHBOURS = 0.5  # share of free postures in which bodies must be nearer than the margin to count as neighbours
-SAMPLED_POSTURES = 60
+FINE_RAD, FINE_IN_COARSE = 0.02, 8  # steps of the fastest joint on a way, and how many of them a quick look takes
 BEAM_START_M, BEAM_RADIUS_M, MOST_STEPS = 0.005, 0.002, 60
 
 
@@ -37,42 +36,30 @@ class FreeSpace:
 
     def __init__(self, spec: str | Path, model: CalibratedModel, margin_m: float = MARGIN_M) -> None:
         # What effects do to the joints is far below the margin, and slow to work out one posture after the other.
-        self.cell, self.margin_m = Cell(spec, replace(model, effects=(), residual=None)), margin_m
-        self._ways: dict[bytes, bool] = {}
-        lower, upper = np.maximum(model.robot.lower_rad, -np.pi), np.minimum(model.robot.upper_rad, np.pi)
-        drawn = np.random.default_rng(0).uniform(lower, upper, (8 * SAMPLED_POSTURES, len(lower)))
-        free = drawn[~self.cell.collides(drawn)][:SAMPLED_POSTURES]
-        near = self.cell.clearances(free, margin_m)
-        often = (near.by_pair_m <= margin_m).sum(axis=0) >= NEIGHBOURS * max(len(free), 1)
-        self._neighbours = {pair for pair, so in zip(near.bodies, often, strict=True) if so}
+        self.cell = RoomyCell(spec, replace(model, effects=(), residual=None), margin_m)
+        self._at_poses, self._on_ways = self.cell.room(margin_m), self.cell.room(ON_THE_WAY * margin_m)
+        self._seen: dict[tuple[bytes, bool], bool] = {}
 
     def are_free(self, q_rad: Array) -> Array:
         """``(N,)`` whether the arm at joints ``(N, n)`` keeps its margin."""
-        free = ~self.cell.collides(q_rad)
-        for k in np.flatnonzero(free):  # unrelated postures: Drake has to look at each
-            free[k] = self._keeps(self.margin_m, q_rad[k : k + 1])
-        return free
+        return np.array([self._at_poses.is_kept(q) for q in q_rad], bool)  # Drake answers one posture at a time
 
     def way_is_free(self, start: Array, end: Array) -> bool:
-        """Whether all joints in step lead from ``(n,)`` to ``(n,)`` with margin; asked in fine steps, remembered."""
-        key = np.concatenate([start, end] if tuple(start) < tuple(end) else [end, start]).tobytes()
-        if key not in self._ways:
-            self._ways[key] = self.seems_free(start, end) and self._keeps(
-                ON_THE_WAY * self.margin_m, _steps(start, end, FINE_RAD)
-            )
-        return self._ways[key]
+        """Whether all joints in step lead from ``(n,)`` to ``(n,)`` with margin, in fine steps."""
+        return self.seems_free(start, end) and self._remembered(start, end, thoroughly=True)
 
     def seems_free(self, start: Array, end: Array) -> bool:
-        """A quick look at a way: nothing touches in coarse steps, its middle first."""
-        steps = _steps(start, end, COARSE_RAD)
-        order = np.argsort(_halving(len(steps)), kind="stable")
-        return not any(self.cell.collides(steps[k : k + 1])[0] for k in order)
+        """A quick look at a way: the same in coarse steps."""
+        return self._remembered(start, end, thoroughly=False)
 
-    def _keeps(self, margin_m: float, q_rad: Array) -> bool:
-        near = self.cell.clearances(q_rad, margin_m)
-        watched = [p for p, pair in enumerate(near.bodies) if pair not in self._neighbours]
-        touched = near.by_pair_m.min(initial=np.inf) <= 0.0
-        return not touched and bool(near.by_pair_m[:, watched].min(initial=np.inf) > margin_m)
+    def _remembered(self, start: Array, end: Array, *, thoroughly: bool) -> bool:
+        start, end = (start, end) if tuple(start) < tuple(end) else (end, start)
+        key = (start.tobytes() + end.tobytes(), thoroughly)
+        if key not in self._seen:
+            coarse = max(int(np.ceil(np.abs(end - start).max() / (FINE_IN_COARSE * FINE_RAD))), 1)
+            shares = _shares(coarse, thoroughly)
+            self._seen[key] = all(self._on_ways.is_kept(start + share * (end - start)) for share in shares)
+        return self._seen[key]
 
     def beam_is_unbroken(self, q_rad: Array, p_WE: Array, p_WT: Array) -> bool:
         """Whether nothing of cell and arm stands between reflector ``(3,)`` and tracker ``(3,)``, the arm at ``(n,)``.
@@ -81,27 +68,31 @@ class FreeSpace:
         Shapes that hold the reflector's centre are its own ball.
         """
         query = self.cell.query_at(q_rad)
-        own = {found.id_G for found in query.ComputeSignedDistanceToPoint(p_WE) if found.distance <= 0.0}
+        own = {found.id_G for found in query.ComputeSignedDistanceToPoint(p_WE, 0.0) if found.distance <= 0.0}
         length = float(np.linalg.norm(p_WT - p_WE))
-        along, travelled = (p_WT - p_WE) / length, BEAM_START_M
+        along, travelled, nearest = (p_WT - p_WE) / length, BEAM_START_M, np.inf
         for _ in range(MOST_STEPS):
             if travelled >= length:
                 return True
-            found = query.ComputeSignedDistanceToPoint(p_WE + travelled * along)
-            nearest = min((other.distance for other in found if other.id_G not in own), default=np.inf)
+            for found in query.ComputeSignedDistanceToPoint(p_WE + travelled * along, nearest):
+                if found.distance < nearest and found.id_G not in own:
+                    nearest = found.distance
             if nearest <= BEAM_RADIUS_M:
                 return False
             travelled += nearest
+            nearest *= 2.0  # at the next point at most: as far as from this one, and the step
         return False  # so many small steps: it grazes something
 
 
-def _steps(start: Array, end: Array, step_rad: float) -> Array:
-    count = max(int(np.ceil(np.abs(end - start).max() / step_rad)), 1)
-    return np.linspace(start, end, count + 1)
+@lru_cache(maxsize=1024)
+def _shares(coarse: int, fine: bool) -> tuple[float, ...]:
+    """Where on a way to look, from 0 to 1: at its coarse steps, or at the fine ones between them.
 
-
-def _halving(count: int) -> Array:
-    """``(count,)`` rank of each step: the ends and the middle first, then the middles of the halves."""
-    index = np.arange(count)
+    The ends and the middle come first, then the middles of the halves: what blocks a way is found soon.
+    """
+    count = FINE_IN_COARSE * coarse
+    steps = np.arange(count + 1)
+    steps = steps[(steps % FINE_IN_COARSE != 0) == fine]
+    index = np.arange(len(steps))
     lowest_bit = np.where(index > 0, index & -index, 1 << 30)
-    return -lowest_bit
+    return tuple((steps[np.argsort(-lowest_bit, kind="stable")] / count).tolist())

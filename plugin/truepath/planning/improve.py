@@ -80,10 +80,10 @@ def plan_improvement(
     say("looking for what cannot be told apart")
     confusions = tuple(all_confusions(Search(kinematic.fit, kinematic.context, found), kinematic, found.terms))
     say("looking for poses all over the workspace")
-    workspace = feasible.anywhere().draw(WORKSPACE, rng)
+    workspace = feasible.anywhere().draw(WORKSPACE, rng, roughly=True)
     if len(workspace) < LEAST_CANDIDATES:
         raise feasible.anywhere().complain(rng)
-    drawn = feasible.draw(candidates, rng, say)
+    drawn = feasible.draw(candidates, rng, say, roughly=True)
     if len(drawn) < LEAST_CANDIDATES:
         raise feasible.complain(rng)
     hoped, not_planned = planned_terms(feasible.robot, effects, workspace)

@@ -20,7 +20,7 @@ from truepath.lie import Array
 CORRELATION = 0.10  # no more of it costs anything
 WEIGHT = 20.0
 LEAST_GAP = 1.0 / 3.0  # of the campaign, between two visits of a pose
-MOVES_PER_STOP, MOST_MOVES = 700, 80_000
+MOVES_PER_STOP, MOST_MOVES = 1000, 80_000
 HOT, COLD = 0.05, 1e-4
 
 
@@ -75,36 +75,38 @@ def mixed_order(ways: Array, Z: Array, twins: Array, rng: np.random.Generator) -
     short = max(_length(ways, order), 1e-9)
     clock, place = _clock(N), np.empty(N, int)
     correlations = Z[order].T @ clock
+    one, other = twins.T
 
     def untold(found: Array, placed: Array) -> float:
         excess = np.maximum(np.abs(found) - CORRELATION, 0.0)
-        gap = LEAST_GAP - np.abs(placed[twins[:, 0]] - placed[twins[:, 1]]) / N
-        return WEIGHT * float(excess @ excess) + WEIGHT * float(np.sum(np.maximum(gap, 0.0) ** 2))
+        gap = np.maximum(LEAST_GAP - np.abs(placed[one] - placed[other]) / N, 0.0)
+        return WEIGHT * float(excess @ excess + gap @ gap)
 
     place[order] = np.arange(N)
-    length, penalty = short, untold(correlations, place)
-    best, least = order.copy(), length / short + penalty
+    length, penalty = 1.0, untold(correlations, place)
+    best, least = order.copy(), length + penalty
     moves = min(MOVES_PER_STOP * N, MOST_MOVES)
-    cooling = (COLD / HOT) ** (1.0 / moves)
-    heat = HOT
-    ends, luck = np.sort(rng.integers(0, N, (moves, 2)), axis=1), rng.random(moves)
-    for (a, b), chance in zip(ends.tolist(), luck.tolist(), strict=True):
-        heat *= cooling
-        if a == b:
+    heat = HOT * (COLD / HOT) ** (np.arange(1, moves + 1) / moves)
+    # By how much a move may make the order worse: what a chance of exp(-worse / heat) comes to, drawn beforehand.
+    allowed = heat * rng.exponential(size=moves)
+    ends = np.sort(rng.integers(0, N, (moves, 2)), axis=1)
+    way, tour = (ways / short).tolist(), [N, *order.tolist(), N]
+    for (a, b), most in zip(ends.tolist(), allowed.tolist(), strict=True):
+        first, last = tour[a + 1], tour[b + 1]
+        from_before, from_after = way[tour[a]], way[tour[b + 2]]
+        change = from_before[last] + from_after[first] - from_before[first] - from_after[last]
+        if a == b or change - penalty > most:  # too long, even if it were mixed perfectly: most moves end here
             continue
-        before, after = (order[a - 1] if a else N), (order[b + 1] if b + 1 < N else N)
-        change = ways[before, order[b]] + ways[order[a], after] - ways[before, order[a]] - ways[order[b], after]
-        turned = order[a : b + 1][::-1]
-        found = correlations + Z[turned].T @ (clock[a : b + 1] - clock[a : b + 1][::-1])
+        turned = order[a : b + 1][::-1].copy()
+        found = correlations + (clock[a : b + 1] - clock[a : b + 1][::-1]) @ Z[turned]
         placed = place.copy()
         placed[turned] = np.arange(a, b + 1)
         new = untold(found, placed)
-        worse = change / short + new - penalty
-        if worse <= 0.0 or chance < np.exp(-worse / heat):
-            order[a : b + 1] = turned
+        if change + new - penalty <= most:
+            order[a : b + 1], tour[a + 1 : b + 2] = turned, turned.tolist()
             correlations, place, length, penalty = found, placed, length + change, new
-            if length / short + penalty < least:
-                best, least = order.copy(), length / short + penalty
+            if length + penalty < least:
+                best, least = order.copy(), length + penalty
     return best
 
 

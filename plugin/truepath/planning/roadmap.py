@@ -7,7 +7,7 @@ import numpy as np
 from truepath.lie import Array
 from truepath.planning.free_space import FreeSpace
 
-NODES, TRIES = 250, 12
+NODES, TRIES = 150, 8
 
 
 class Roadmap:

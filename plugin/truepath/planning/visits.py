@@ -51,9 +51,9 @@ class Visiting:
         """``(N, 2, n)`` points from which poses are approached, first and second."""
         return q_rad[:, None] + RUN_UP_RAD * np.stack([-directions, directions], axis=1)
 
-    def pass_test(self, q_rad: Array, directions: Array) -> Array:
-        """``(N,)`` which poses can be visited so."""
-        passed = self.feasible.check(q_rad)
+    def are_possible(self, q_rad: Array, directions: Array) -> Array:
+        """``(N,)`` which poses can be visited so, of those that are in place."""
+        passed = self.feasible.are_possible(q_rad)
         return passed & self.can_be_approached(q_rad, directions, passed)
 
     def can_be_approached(self, q_rad: Array, directions: Array, asked: Array | None = None) -> Array:

@@ -18,7 +18,7 @@ from truepath.lie import Array
 from truepath.planning.free_space import FreeSpace
 from truepath.planning.roadmap import Roadmap
 
-NEIGHBOURS = 16  # of each point on the roadmap
+NEIGHBOURS = 16  # of each point on the roadmap, and of each pose to be put in order
 MOST_TRIES = 400  # ways that may turn out to be blocked
 BLOCKED_LONGER, BLOCKED_RAD = 1.5, 0.5  # guess of a way around, for the order: so much longer, and so much on top
 
