@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtri
 
 from truepath.levenberg_marquardt import CONVERGED_CHI2, Solution, minimise, noise_components
 from truepath.lie import Array
@@ -91,5 +91,5 @@ def _median_noise(residual: Array) -> float:
 def inliers(residual: Array, sigma: Array) -> Array:
     """``(N,)`` False where a residual ``(N, m)`` is larger than noise ``(m,)`` ever makes one."""
     N, m = residual.shape
-    limit = stats.chi2.isf(OUTLIER_PROBABILITY / N, m) * OUTLIER_MARGIN**2
+    limit = chdtri(m, OUTLIER_PROBABILITY / N) * OUTLIER_MARGIN**2
     return np.sum((residual / sigma) ** 2, axis=1) <= limit
