@@ -2,9 +2,11 @@
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
+from chromium import DRAWING, headless
 from command import run
 from hidden import Hidden, none
 from hypothesis import settings
@@ -20,9 +22,15 @@ ROOT = Path(__file__).parents[1]
 settings.register_profile("truepath", derandomize=True, deadline=None, database=None)
 settings.load_profile("truepath")
 
-# A shell that starts the tests in the background lets them ignore Ctrl-C, and what they start would inherit that.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# A shell that starts the tests in the background lets them ignore Ctrl-C, and nohup a terminal that is closed; what
+# they start would inherit that.
+for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, usual)
+
+# A machine may be told to keep no compiled files. Then every command that a test starts compiles the package anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # A file goes to one worker as a whole: those that take longest first, so that nobody waits for one at the end.
 LONGEST_FIRST = (
@@ -156,6 +164,13 @@ def one_thread():
     """Threads on matrices of this size cost more than they bring."""
     with threadpool_limits(limits=1):
         yield
+
+
+@pytest.fixture(scope="module")  # a second one, of the tests of another page, cannot be open at the same time
+def browser():
+    """That can draw."""
+    with headless(DRAWING) as chromium:
+        yield chromium
 
 
 @pytest.fixture(scope="session")

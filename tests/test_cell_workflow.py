@@ -3,14 +3,11 @@
 import importlib.util
 import re
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from chromium import DRAWING, headless
-from running_cell import CORNERS_ON_SCREEN, PATIENCE_S, SCREEN, WORKFLOW, Running, Tab
+from running_cell import CORNERS_ON_SCREEN, SCREEN, WORKFLOW, Running, Tab
 
 SCRIPT = """def p():
   movej([0, -1.5708, 1.5708, -1.5708, -1.5708, 0])
@@ -20,10 +17,28 @@ end
 """
 
 
-def run(*arguments):
-    return subprocess.run(
-        [sys.executable, str(WORKFLOW), *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
+@pytest.fixture(scope="module")
+def cell():
+    """The workflow as a module."""
+    spec = importlib.util.spec_from_file_location("cell_workflow", WORKFLOW)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def refused(cell, capsys):
+    """Function: runs it in this process until it ends with exit code 2; gives standard error."""
+
+    def refused(*arguments):
+        try:
+            code = cell.main(arguments)
+        except SystemExit as stop:  # argparse
+            code = stop.code
+        assert code == 2
+        return capsys.readouterr().err
+
+    return refused
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +55,6 @@ def running(script):
     yield host
     if host.process.poll() is None:
         host.process.kill()
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """That can draw."""
-    with headless(DRAWING) as chromium:
-        yield chromium
 
 
 @pytest.fixture(scope="module")
@@ -174,15 +182,15 @@ def test_nothing_was_complained_of_the_terminal_tells_the_warning_and_ctrl_c_end
     assert "Traceback" not in said
 
 
-def test_a_calibration_is_saved_and_loaded_and_it_ends_by_itself(tmp_path):
-    file = tmp_path / "calibration.json"
-    first = run("--once", "--save-calibration", str(file))
-    second = run("--seconds", "0.2", "--calibration", str(file))
-    assert first.returncode == second.returncode == 0, first.stderr + second.stderr
-    results = [re.search(r"weld\.script: .*", done.stdout)[0] for done in (first, second)]
+def test_a_calibration_is_saved_and_loaded_and_it_ends_by_itself(cell, tmp_path, capsys):
+    file, said = str(tmp_path / "calibration.json"), []
+    for arguments in (["--once", "--save-calibration", file], ["--seconds", "0.2", "--calibration", file]):
+        assert cell.main(arguments) == 0
+        said.append(capsys.readouterr().out)
+    results = [re.search(r"weld\.script: .*", text)[0] for text in said]
     assert results[0] == results[1]
-    assert "measuring" in first.stdout
-    assert "measuring" not in second.stdout
+    assert "measuring" in said[0]
+    assert "measuring" not in said[1]
 
 
 def test_ctrl_c_ends_it_while_it_calibrates():
@@ -202,27 +210,21 @@ def test_ctrl_c_ends_it_while_it_calibrates():
         (["--port", "80"], "port"),
     ],
 )
-def test_bad_input_gives_one_message_and_exit_code_2(arguments, message):
-    done = run("--once", *arguments)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
-    assert done.stderr.count("error: ") == 1
+def test_bad_input_gives_one_message_and_exit_code_2(refused, arguments, message):
+    said = refused("--once", *arguments)
+    assert message in said
+    assert "Traceback" not in said
+    assert said.count("error: ") == 1
 
 
-def test_a_port_that_is_taken_is_told():
+def test_a_port_that_is_taken_is_told(refused):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        done = run("--once", "--port", str(taken.getsockname()[1]))
-    assert done.returncode == 2
-    assert "a port that is free" in done.stderr
+        assert "a port that is free" in refused("--once", "--port", str(taken.getsockname()[1]))
 
 
-def test_the_plugin_is_found_by_its_entry_point(monkeypatch, capsys):
-    spec = importlib.util.spec_from_file_location("cell_workflow", WORKFLOW)
-    cell = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(cell)
+def test_the_plugin_is_found_by_its_entry_point(cell, monkeypatch, capsys):
     from truepath.host import CalibrationPlugin
 
     assert cell.load_plugin() is CalibrationPlugin

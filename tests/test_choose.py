@@ -176,7 +176,7 @@ from test_choose import joint_by_joint, places
 
 real = RealRobot("ur5", 21)
 with threadpool_limits(1):
-    kinematic = fit_kinematics(real.robot, Hidden(real, both(wavy(5, 3e-4, 4), joint_by_joint)).measured(250, 13))
+    kinematic = fit_kinematics(real.robot, Hidden(real, both(wavy(5, 3e-4, 4), joint_by_joint)).measured(120, 13))
     choice = choose(kinematic.fit, kinematic.context)
 print(sorted(places(choice.named)), sorted(places(choice.nameless)), choice.hypotheses)
 """

@@ -44,15 +44,20 @@ def folder(data, tmp_path_factory):
     return tmp_path_factory.mktemp("results") / "a" / "b"
 
 
-@pytest.fixture(scope="module")
-def outcome(data, folder):
-    """Of the command, run once."""
+def diagnosed(*arguments):
+    """Outcome of the command, run once for many tests."""
     out, err = StringIO(), StringIO()
     silent = SimpleNamespace(readouterr=lambda: SimpleNamespace(out="", err=""))
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        result = run(patch, silent, "diagnose", data, "--robot", "ur5_cell", "-o", folder)
+        result = run(patch, silent, "diagnose", *arguments, "--robot", "ur5_cell")
     result.out, result.err = out.getvalue(), err.getvalue()
     return result
+
+
+@pytest.fixture(scope="module")
+def outcome(data, folder):
+    """Of the command."""
+    return diagnosed(data, "-o", folder)
 
 
 @pytest.fixture(scope="module")
@@ -168,11 +173,36 @@ def test_what_is_left_comes_with_its_chance_and_the_noise_floor(content):
 # Other ways to ask
 
 
-def test_json_for_machines_is_the_content_of_the_file(truepath, data, content, tmp_path):
-    outcome = truepath("diagnose", data, "--robot", "ur5_cell", "-o", tmp_path, "--json")
-    assert outcome.code == 0
-    assert outcome.json() == content
-    assert json.loads((tmp_path / "diagnosis.json").read_text()) == content
+@pytest.fixture(scope="module")
+def crowded(few, tmp_path_factory):
+    """A folder of results with an older diagnosis in it and files of the customer: the data, and poses of his own."""
+    folder = tmp_path_factory.mktemp("crowded")
+    for name in ("diagnosis.json", "report.html", "calibration.json", "poses_for_tuesday.csv"):
+        (folder / name).write_text("old")
+    (folder / "poses_monday.csv").write_bytes(few.read_bytes())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def for_machines(crowded):
+    """Of the command with that folder and ``--json``."""
+    return diagnosed(crowded / "poses_monday.csv", "-o", crowded, "--json")
+
+
+def test_json_for_machines_is_the_content_of_the_file(for_machines, crowded):
+    assert for_machines.code == 0
+    assert for_machines.json() == json.loads((crowded / "diagnosis.json").read_text())
+
+
+def test_an_older_diagnosis_is_replaced_as_a_whole(for_machines, crowded):
+    assert for_machines.json()["data"]["poses"] == 40
+    assert "old" not in [(crowded / name).read_text() for name in ("report.html", "calibration.json")]
+
+
+def test_files_of_the_customer_beside_the_results_stay_whatever_they_are_called(for_machines, crowded, few):
+    assert for_machines.code == 0
+    assert (crowded / "poses_monday.csv").read_bytes() == few.read_bytes()
+    assert (crowded / "poses_for_tuesday.csv").read_text() == "old"
 
 
 def test_calibrate_with_effects_auto_learns_the_very_same_robot(truepath, data, folder, content, tmp_path):
@@ -183,14 +213,6 @@ def test_calibrate_with_effects_auto_learns_the_very_same_robot(truepath, data, 
         for path in (tmp_path / "c.json", folder / "calibration.json")
     )
     assert mine == theirs
-
-
-def test_an_older_diagnosis_is_replaced_as_a_whole(truepath, few, tmp_path):
-    for name in ("diagnosis.json", "report.html", "calibration.json"):
-        (tmp_path / name).write_text("old")
-    assert truepath("diagnose", few, "--robot", "ur5_cell", "-o", tmp_path).code == 0
-    assert json.loads((tmp_path / "diagnosis.json").read_text())["data"]["poses"] == 40
-    assert "old" not in [(tmp_path / name).read_text() for name in ("report.html", "calibration.json")]
 
 
 def test_too_few_poses_to_spare_any_still_give_a_calibration_and_a_report(truepath, data, tmp_path):
@@ -270,12 +292,3 @@ def test_the_measured_data_are_not_overwritten_by_a_result(truepath, few, tmp_pa
     assert is_refused(truepath("diagnose", mine, "--robot", "ur5_cell", "-o", tmp_path), "the output is the input")
     assert mine.read_bytes() == few.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
-
-
-def test_files_of_the_customer_beside_the_results_stay_whatever_they_are_called(truepath, few, tmp_path):
-    measured, other = tmp_path / "poses_monday.csv", tmp_path / "poses_for_tuesday.csv"
-    measured.write_bytes(few.read_bytes())
-    other.write_text("keep")
-    assert truepath("diagnose", measured, "--robot", "ur5_cell", "-o", tmp_path).code == 0
-    assert measured.read_bytes() == few.read_bytes()
-    assert other.read_text() == "keep"

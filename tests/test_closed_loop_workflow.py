@@ -26,7 +26,7 @@ def loop(tmp_path_factory):
     """The finished process and the folder of its results."""
     folder = tmp_path_factory.mktemp("loop")
     (folder / "seam.script").write_text(PROGRAM)
-    command = [sys.executable, SCRIPT, "-o", folder / "out", "--program", folder / "seam.script", "--poses", "60"]
+    command = [sys.executable, SCRIPT, "-o", folder / "out", "--program", folder / "seam.script", "--poses", "40"]
     done = subprocess.run(
         [*command, "--address", "127.0.4.9", "--speed-up", "20"],
         capture_output=True,

@@ -71,7 +71,14 @@ class TestDiagnosis:
         assert says_ambiguous(verdict, truth)
 
     @pytest.mark.parametrize(
-        ("design", "seed"), [("small_workspace", 2), ("sweep", 0), ("sweep", 1), ("sweep", 2)], ids=str
+        ("design", "seed"),
+        [
+            ("small_workspace", 2),
+            ("sweep", 0),
+            pytest.param("sweep", 1, marks=pytest.mark.slow),
+            pytest.param("sweep", 2, marks=pytest.mark.slow),
+        ],
+        ids=str,
     )
     def test_admits_a_doubt_and_settles_it_with_the_poses_that_it_asked_for(self, design, seed):
         case = draw_case(f"confounded:{design}", seed, outliers=False)

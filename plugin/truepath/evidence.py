@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from truepath.errors import CalibrationError
 from truepath.lie import Array
@@ -117,15 +117,15 @@ def infer(
     for _ in range(MAX_ITERATIONS):
         precision = fixed_sigma**-2.0
         precision[grouped] = size[group[grouped]] ** -2.0
-        x, covariance, log_det = _solve(problem, precision, sigma)
-        known = 1.0 - precision * np.diag(covariance)  # how far the data, not the prior, determines each
+        x, half, log_det = _solve(problem, precision, sigma)
+        known = 1.0 - precision * np.diag(half)  # how far the data, not the prior, determines each
         new_size = size.copy()
         if grouped.any():
             squares = np.bincount(group[grouped], x[grouped] ** 2, len(size))
             weight = np.bincount(group[grouped], known[grouped], len(size))
             new_size = np.sqrt(squares / np.maximum(weight, 1e-6))
         new_size = np.clip(new_size, VANISHED * plausible, 1e3 * plausible)
-        new_sigma = [_noise(problem, kind, x, covariance, sigma[kind]) for kind in range(len(sigma))]
+        new_sigma = [_noise(problem, kind, x, half, sigma[kind]) for kind in range(len(sigma))]
         matters = np.maximum(size, new_size) > IRRELEVANT * plausible
         changes = np.concatenate([new_size[matters] / size[matters], np.divide(new_sigma, sigma)])
         size, sigma = new_size, new_sigma
@@ -133,27 +133,39 @@ def infer(
             break
     precision = fixed_sigma**-2.0
     precision[grouped] = size[group[grouped]] ** -2.0
-    x, covariance, log_det = _solve(problem, precision, sigma)
+    x, half, log_det = _solve(problem, precision, sigma)
     alive = int(np.sum(size > IRRELEVANT * plausible))
     log_evidence = _log_evidence(problem, x, precision, log_det, sigma, alive)
+    covariance = half + np.tril(half, -1).T
     return Posterior(x, covariance, sigma, size, log_evidence, sum(problem.count))
 
 
 def _solve(problem: LinearProblem, precision: Array, sigma: list[float]) -> tuple[Array, Array, float]:
-    """Mean, covariance and log determinant of the posterior precision, in scaled coordinates for stability."""
+    """Mean, lower triangle of the covariance (zeros above it) and log determinant of the posterior precision.
+
+    In scaled coordinates for stability, and in place: for hundreds of parameters, moving these matrices through
+    memory costs as much as the arithmetic.
+    """
     if not len(precision):
         return np.zeros(0), np.zeros((0, 0)), 0.0
-    H = sum((H / s**2 for H, s in zip(problem.H, sigma, strict=True)), np.zeros_like(problem.H[0]))
-    g = sum((g / s**2 for g, s in zip(problem.g, sigma, strict=True)), np.zeros_like(problem.g[0]))
-    total = np.diag(H) + precision
+    scaled, g = problem.H[0] / sigma[0] ** 2, problem.g[0] / sigma[0] ** 2
+    for H, of_kind, s in zip(problem.H[1:], problem.g[1:], sigma[1:], strict=True):
+        scaled += H / s**2
+        g += of_kind / s**2
+    scaled.flat[:: len(g) + 1] += precision
+    total = np.diag(scaled).copy()
     scale = total**-0.5
-    factor, failed = dpotrf(scale[:, None] * (H + np.diag(precision)) * scale, lower=True)
+    scaled *= scale[:, None]
+    scaled *= scale
+    factor, failed = dpotrf(scaled.T, lower=True, overwrite_a=True)  # transposed: as LAPACK has it, nothing is copied
     if failed:
         raise CalibrationError("the effects cannot be told apart numerically")
-    inverse = dpotri(factor, lower=True)[0]
-    covariance = scale[:, None] * (np.tril(inverse) + np.tril(inverse, -1).T) * scale
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor)))) + float(np.sum(np.log(total)))
-    return covariance @ g, covariance, log_det
+    x = scale * dpotrs(factor, scale * g, lower=True)[0]
+    half = dpotri(factor, lower=True, overwrite_c=True)[0]
+    half *= scale[:, None]
+    half *= scale
+    return x, half, log_det
 
 
 def _squares(problem: LinearProblem, kind: int, x: Array) -> float:
@@ -162,8 +174,10 @@ def _squares(problem: LinearProblem, kind: int, x: Array) -> float:
     return max(left, ROUNDING * problem.yy[kind], 1e-300)
 
 
-def _noise(problem: LinearProblem, kind: int, x: Array, covariance: Array, sigma: float) -> float:
-    spent = float(np.sum(covariance * problem.H[kind])) / sigma**2
+def _noise(problem: LinearProblem, kind: int, x: Array, half: Array, sigma: float) -> float:
+    H = problem.H[kind]
+    trace = 2.0 * float(np.vdot(half.T, H)) - float(np.diag(half) @ np.diag(H))  # of covariance and H, both symmetric
+    spent = trace / sigma**2
     return float(np.sqrt(_squares(problem, kind, x) / max(problem.count[kind] - spent, 1.0)))
 
 

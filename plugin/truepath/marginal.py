@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg.lapack import dtrtrs
 
 from truepath.evidence import LinearProblem
 from truepath.lie import Array
@@ -23,15 +23,14 @@ class Marginal:
 
     Attributes:
         sigma: ``(m,)`` noise of the readings, m and rad.
-        J: ``(N m, k)`` whitened derivatives by the parameters, in units of ``scale``.
-        factor: Cholesky factor of J^T J and the prior.
+        Q: ``(N m, k)`` whitened derivatives by the parameters, J L^-T with L L^T = J^T J and the prior: what the
+            parameters can do to readings r is Q Q^T r.
         y: ``(N, m)`` whitened readings, projected.
         spent: number of readings of each kind that the parameters use up.
     """
 
     sigma: Array
-    J: Array
-    factor: Array
+    Q: Array
     y: Array
     spent: tuple[float, ...]
 
@@ -43,22 +42,22 @@ class Marginal:
         scale = (np.diag(H) + prior_sigma**-2.0) ** -0.5
         H *= scale[:, None] * scale
         factor = np.linalg.cholesky(H + np.diag((scale / prior_sigma) ** 2))
-        rows *= scale
+        Q = np.ascontiguousarray(dtrtrs(factor, (rows * scale).T, lower=True)[0].T)
         whitened = (y / sigma).ravel()
-        left = whitened - rows @ cho_solve((factor, True), rows.T @ whitened)
-        solved = cho_solve((factor, True), rows.T)
-        leverage = np.einsum("kr,rk->r", solved, rows).reshape(y.shape)
+        left = whitened - Q @ (Q.T @ whitened)
+        leverage = np.einsum("rk,rk->r", Q, Q).reshape(y.shape)
         spent = tuple(float(leverage[:, k : k + 3].sum()) for k in range(0, y.shape[1], 3))
-        return cls(sigma, rows, factor, left.reshape(y.shape), spent)
+        return cls(sigma, Q, left.reshape(y.shape), spent)
 
     def project(self, A: Array) -> Array:
         """``(N, m, K)`` columns in m and rad, whitened and without what the kinematics can imitate."""
         rows = (A / self.sigma[:, None]).reshape(A.shape[0] * A.shape[1], A.shape[2])
-        return (rows - self.J @ cho_solve((self.factor, True), self.J.T @ rows)).reshape(A.shape)
+        rows -= self.Q @ (self.Q.T @ rows)
+        return rows.reshape(A.shape)
 
     def first(self, count: int) -> Marginal:
         """With only the first ``count`` parameters taken out; y stays as it is. To rank columns, and fast."""
-        return Marginal(self.sigma, self.J[:, :count], self.factor[:count, :count], self.y, self.spent)
+        return Marginal(self.sigma, self.Q[:, :count], self.y, self.spent)
 
     def problem(self, projected: Array, y: Array | None = None) -> LinearProblem:
         """Of projected columns ``(N, m, K)``; noise is 1 per kind of reading."""

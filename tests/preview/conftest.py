@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chromium import DRAWING, headless
 from opened_page import UNKIND, OpenPage
 from truepath import lie, poe
 from truepath.calibration import Calibration
@@ -52,13 +51,6 @@ def page_file(tmp_path_factory, calibration, q_programmed, q_corrected) -> Path:
     labels = [f"point <{k}>" for k in range(len(q_programmed))]
     write_preview(file, calibration, q_programmed, q_corrected, robot_source="ur5", title=UNKIND, labels=labels)
     return file
-
-
-@pytest.fixture(scope="module")  # a second one, of the tests of another page, cannot be open at the same time
-def browser():
-    """That can draw."""
-    with headless(DRAWING) as chromium:
-        yield chromium
 
 
 @pytest.fixture(scope="module")

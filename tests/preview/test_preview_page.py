@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from opened_page import BLUE, DESKTOP, LAPTOP, PHONE, UNKIND, VERMILLION, OpenPage, changed, pixels_of
+from opened_page import BLUE, DESKTOP, LAPTOP, PHONE, SMALL, UNKIND, VERMILLION, OpenPage, changed, pixels_of
 from PIL import Image
 
 
@@ -32,8 +32,8 @@ class TestThePageInABrowser:
         opened.go_to(0.6)
         picture = opened.scene()
         assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 1000
-        assert pixels_of(VERMILLION, picture) > 300
-        assert pixels_of(BLUE, picture) > 1000
+        assert pixels_of(VERMILLION, picture) > 100
+        assert pixels_of(BLUE, picture) > 300
 
     def test_moves(self, opened):
         opened.go_to(0.0)
@@ -135,6 +135,7 @@ class TestThePageInABrowser:
 
     def test_is_printed_with_a_picture(self, opened):
         """Chromium tells pages that it prints; what was a canvas is then an image."""
+        opened.tab.set_viewport_size(LAPTOP)  # of a smaller picture too much is edges, which are smoothed in between
         opened.go_to(0.6)
         on_screen = opened.scene()
         opened.tab.evaluate(
@@ -148,6 +149,7 @@ class TestThePageInABrowser:
         printed = np.asarray(picture.resize(on_screen.shape[1::-1])).astype(int)
         assert changed(printed, on_screen) < 0.02
         assert not opened.tab.is_visible("#picture")
+        opened.tab.set_viewport_size(SMALL)
 
     def test_without_webgl_still_tells_the_numbers(self, browser, page_file):
         tab = browser.new_page()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from opened_page import OpenPage, changed
+from opened_page import LAPTOP, OpenPage, changed
 from truepath.controller import controller_of
 from truepath.errors import InputError
 from truepath.plants import models_dir
@@ -133,7 +133,7 @@ def test_a_long_program_is_small_and_quick(tmp_path, browser, calibration, count
     assert page_file.stat().st_size < 15e6
     took = []
     for _ in range(3):  # the best of them: other tests may be using the cores
-        page = OpenPage(browser, page_file)
+        page = OpenPage(browser, page_file, LAPTOP)
         took.append(page.ready_after_s())
         page.go_to(0.5)
         assert page.scene().std() > 10

@@ -12,7 +12,7 @@ import pytest
 import spoil
 
 SCRIPT = Path(__file__).parents[2] / "workflows" / "fuzz_programs.py"
-SOME, MANY = 150, 5000
+SOME, MANY = 80, 5000
 
 
 @pytest.fixture(scope="module")

@@ -129,7 +129,7 @@ def test_without_a_cause_nothing_more_is_recorded(robots, joints):
 # A diagnosis
 
 
-@every_seed
+@pytest.mark.parametrize("seed", [SEEDS[0], *(pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[1:])])
 @every_cause
 def test_a_diagnosis_names_it_with_its_joints_and_a_second_campaign_agrees(robots, joints, name, seed):
     real, causes = robots[seed], draw_causes(robots[seed], [name])

@@ -6,7 +6,7 @@ from generate import program
 from scripts import SCRIPTS, differs_elsewhere, expected_of, faults, new_targets, nothing_new, read
 from truepath.errors import InputError
 
-MANY = 1000
+SOME, MANY = 250, 1000
 CALL = "movel(p[0.1, 0.2, 0.3, 0, 0, 0], a=1, v=0.1)"
 
 
@@ -24,8 +24,9 @@ def test_the_corpus_stays_as_it_is_to_the_byte(script):
     assert read(script.read_bytes()).rewritten(nothing_new(), [], "") == script.read_bytes()
 
 
-def test_generated_programs_are_read_as_they_were_made_and_stay_as_they_are():
-    for seed in range(MANY):
+@pytest.mark.parametrize("seeds", [range(SOME), pytest.param(range(SOME, MANY), marks=pytest.mark.slow)], ids=len)
+def test_generated_programs_are_read_as_they_were_made_and_stay_as_they_are(seeds):
+    for seed in seeds:
         made = program(seed, statements=2 + seed % 12)
         parsed = read(made.data)
         # Where nothing at the top moves or calls, the generator sees nothing done; truepath takes the definitions.

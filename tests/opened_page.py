@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image
 
 LAPTOP, DESKTOP, PHONE = (dict(width=w, height=h) for w, h in ((1366, 768), (1920, 1080), (390, 844)))
+SMALL = dict(width=900, height=500)  # drawn by the processor: every pixel counts
 VERMILLION, BLUE = (0xD5, 0x5E, 0x00), (0x00, 0x72, 0xB2)
 UNKIND = "</script><script>document.title='broken'</script> & <b>\"bold\"</b> <!--"
 # Reading a pixel waits until the picture is really drawn.
@@ -23,7 +24,7 @@ HIDE_WHAT_LIES_OVER = "#scale, #views { visibility: hidden; }"
 class OpenPage:
     """The page in a browser, with all that it asked for and complained about since it was opened."""
 
-    def __init__(self, browser, file: Path, screen: dict[str, int] = LAPTOP) -> None:
+    def __init__(self, browser, file: Path, screen: dict[str, int] = SMALL) -> None:
         self.requests: list[str] = []
         self.complaints: list[str] = []
         self.tab = browser.new_page(viewport=screen)
