@@ -38,8 +38,12 @@ LONGEST_FIRST = (
     "test_closed_loop_workflow.py",
     "test_docs.py",
     "test_hidden_effects.py",
+    "test_preview_page.py",
+    "test_batch_cluster.py",
     "test_cell_workflow.py",
-    "test_benchmark.py",
+    "test_demo.py",
+    "test_preview_program.py",
+    "test_batch_ci.py",
 )
 
 

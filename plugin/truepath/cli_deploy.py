@@ -32,6 +32,15 @@ def deploy(
     start_within_deg: Annotated[
         float, typer.Option(min=0, help="how far any joint may be from where the program starts")
     ] = 30.0,
+    stall_s: Annotated[
+        float | None,
+        typer.Option(
+            "--stall-s",
+            help="stop a robot that stands for so long while the program runs; default: 20, or twice the program's "
+            "longest wait; said, not stopped, where a sensor decides how it goes on",
+            show_default=False,
+        ),
+    ] = None,
     uncorrected: Annotated[
         bool, typer.Option("--uncorrected", help="allow a program that was not corrected with this calibration")
     ] = False,
@@ -53,6 +62,7 @@ def deploy(
         from truepath import console
         from truepath.calibration import load_calibration
         from truepath.deploying.deploy import DeployOptions, NotReady, prepare
+        from truepath.deploying.load import bare_arm
         from truepath.deploying.printed import print_outcome, print_prepared
         from truepath.pipeline import keep, require_place
         from truepath.rewriting.stated import stated_options
@@ -60,6 +70,8 @@ def deploy(
 
         if not (yes or dry_run or sys.stdin.isatty()):
             raise InputError("nobody is there to ask whether the robot may move", expected="a terminal, or --yes")
+        if stall_s is not None and not (math.isfinite(stall_s) and stall_s > 0):
+            raise InputError("no such time", expected="--stall-s above 0", found=f"{stall_s:g}")
         if record is not None:
             keep(record, program, calibration)
             require_place(record)
@@ -72,7 +84,9 @@ def deploy(
             stated.tool,
             stated.start_rad,
             math.radians(start_within_deg),
+            stall_s,
         )
+        bare_arm(loaded.model.robot)  # read by Drake, once
     try:
         with interruptible(), RobotLink(robot_host, options.timeout_s) as link:
             with console.progress("looking at program and robot"):
@@ -115,14 +129,14 @@ def _run(prepared: Prepared, link: RobotLink, record: Path | None) -> Outcome:
             else:
                 say("past the last target that is known")
 
-        return run(prepared, link, record, watched)
+        return run(prepared, link, record, watched, lambda text: console.err.print(text, style="yellow"))
 
 
 def _ask(yes: bool) -> None:
     """Before anything moves."""
     from truepath import console
 
-    if not yes and not typer.confirm("The robot will move. Is the way clear?"):
+    if not yes and not console.agrees("The robot will move. Is the way clear?"):
         console.out.print("nothing was moved")
         raise typer.Exit(1)
 

@@ -72,7 +72,7 @@ def record(
             _announce(intention, speed_deg)
             if yes:
                 _require_near(intention, first_move_deg)
-            elif not typer.confirm(_question(intention)):
+            elif not console.agrees(_question(intention)):
                 console.out.print("nothing was moved")
                 raise typer.Exit(1)
             campaign.require_free_robot()  # much may have happened while the question stood
@@ -125,6 +125,8 @@ def _announce(intention: Intention, speed_deg: float) -> None:
         f"{speed_deg:g} deg/s. It goes to row {intention.first_row + 1} of the list first; "
         f"joints turn by {travel} deg."
     )
+    if intention.remark:
+        console.warn(intention.remark)
     if not intention.known:
         console.warn(
             "The robot does not stand on a way of the list: nobody has looked whether anything is in the way of its "

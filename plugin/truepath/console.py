@@ -40,6 +40,19 @@ def complain(text: str) -> None:
     err.print(text, style="red")
 
 
+def agrees(question: str) -> bool:
+    """Asks a person. What was typed before the question could be seen is no answer to it."""
+    import sys
+
+    import typer
+
+    if sys.stdin.isatty():
+        import termios
+
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
+    return typer.confirm(question)
+
+
 def print_json(content: Any) -> None:
     """For machines: nothing but JSON on standard output."""
     print(json.dumps(content, indent=1, allow_nan=False))

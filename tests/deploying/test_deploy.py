@@ -16,6 +16,7 @@ from truepath.deploying.follow import send_and_follow
 from truepath.deploying.passages import Passages
 from truepath.deploying.rehearsal import rehearse
 from truepath.deploying.run_file import RunFile
+from truepath.deploying.stall import Stall
 from truepath.errors import InputError
 
 HOME = np.array([0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0])
@@ -202,7 +203,7 @@ def test_what_stops_a_run_is_told_and_the_robot_stands(controller, slow, calibra
         if passed and not fired:
             fired.append(controller.command({"do": "fault", **fault}))
 
-    outcome = run(prepared, link, tmp_path / "run.csv", watched)
+    outcome = run(prepared, link, tmp_path / "run.csv", watched, print)
     assert not outcome.as_planned
     assert words in outcome.ended
     assert outcome.passed == 1
@@ -223,7 +224,7 @@ def test_ctrl_c_stops_the_robot(controller, slow, calibration, link):
             fired.append(True)
             signal.raise_signal(signal.SIGINT)
 
-    outcome = run(prepared, link, None, watched)
+    outcome = run(prepared, link, None, watched, print)
     assert outcome.followed.interrupted
     assert "Ctrl-C" in outcome.ended
     assert controller.command({"do": "state"})["program"] is None
@@ -232,7 +233,7 @@ def test_ctrl_c_stops_the_robot(controller, slow, calibration, link):
 def test_a_robot_that_only_stands_is_stopped(controller, link, way_of):
     waits, passages = "def waits():\n  sleep(1000)\nend\n", Passages(np.zeros((0, 6)), np.zeros(0))
     with RunFile(None) as nothing:
-        followed = send_and_follow(link, waits, passages, way_of(waits), nothing, 0.4, lambda *_: None)
+        followed = send_and_follow(link, waits, passages, way_of(waits), nothing, Stall(0.4), lambda *_: None)
     assert "has stood" in followed.ended
     assert not followed.completed
     assert controller.command({"do": "state"})["program"] is None
@@ -245,6 +246,6 @@ def test_a_program_that_the_controller_does_not_run_to_its_end_is_told(controlle
     prepared = prepare(path, calibration, link, DeployOptions(uncorrected=True))
     assert any("socket_open" in remark for remark in prepared.remarks)
     assert any("not corrected" in remark for remark in prepared.remarks)
-    outcome = run(prepared, link, None, lambda passed, state: None)
+    outcome = run(prepared, link, None, lambda passed, state: None, print)
     assert outcome.passed == 1
     assert json.loads(json.dumps(outcome.summary()))["not_known"]

@@ -9,9 +9,11 @@ import time
 
 import numpy as np
 import pytest
+from guards_left import guards_have_gone
 from truepath.deploying.follow import send_and_follow
 from truepath.deploying.passages import Passages
 from truepath.deploying.run_file import RunFile
+from truepath.deploying.stall import Stall
 from truepath.robot_link import RobotFault, RobotLink
 from truepath.robot_link.text_ports import ask_dashboard
 
@@ -40,7 +42,7 @@ def follow(link, text, way, when_it_moves):
 
     with RunFile(None) as nothing:
         no_targets = Passages(np.zeros((0, 6)), np.zeros(0))
-        return send_and_follow(link, text, no_targets, way, nothing, 5.0, watched)
+        return send_and_follow(link, text, no_targets, way, nothing, Stall(5.0), watched)
 
 
 def is_over(controller, within_s=0.0):
@@ -93,8 +95,12 @@ def test_what_obeys_nobody_is_told_as_it_is(controller, link, followed, monkeypa
 
     outcome = followed(link, FAR, fails)
     assert "it still moves, and its program has not ended" in outcome.ended
+    assert outcome.ended.endswith(
+        "a process in the background goes on telling it to stop, for an hour or until it does"
+    )
     assert not outcome.completed
     assert is_over(controller, within_s=5.0)  # the guard goes on trying
+    assert guards_have_gone(controller.address)
 
 
 def test_a_program_whose_watcher_was_killed_is_stopped(controller, link):
@@ -110,6 +116,7 @@ def test_a_program_whose_watcher_was_killed_is_stopped(controller, link):
         process.kill()
     assert is_over(controller, within_s=5.0)
     assert controller.command({"do": "state"})["commanded_q_rad"][0] < 1.4
+    assert guards_have_gone(controller.address)
 
 
 def test_nothing_is_sent_while_the_dashboard_is_silent(controller, link, followed, monkeypatch):

@@ -87,7 +87,7 @@ def test_what_changes_while_the_question_is_open_is_seen(controller, weld, calib
     setting(controller, link, **changed)
     before = controller.moves()
     with pytest.raises(NotReady, match=words):
-        run(prepared, link, record, lambda passed, state: None)
+        run(prepared, link, record, lambda passed, state: None, print)
     assert controller.moves() == before
     assert record.read_text() == "of an earlier run"
 

@@ -1,14 +1,22 @@
 """``truepath record`` as a user has it, against the virtual controller. The truth is Drake's."""
 
+import hashlib
 import json
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import truepath.recording.record
 from command import is_refused
 from truepath.measurements import from_table
-from truepath.recording.row_file import progress_file
+from truepath.planning.pose_list import PoseList, to_csv
+from truepath.recording.connected_robot import require_same_robot
+from truepath.recording.readings import Reading
+from truepath.recording.row_file import RowFile, progress_file
+from truepath.recording.visit import Visit, cells, columns
+from truepath.robot_link import RobotLink
 from truepath.tables import read_table
 from truepath.virtual.hidden_causes import draw_causes, true_poses
 from truepath.virtual.real_robot import RealRobot
@@ -115,6 +123,66 @@ def test_a_pose_beyond_the_limits_is_refused_before_anybody_is_asked(truepath, t
 def test_no_speed_and_no_time_are_refused(truepath, poses, tmp_path, option, value):
     places = ("--robot-host", "127.0.2.95", "--tracker", "simulated", "-o", tmp_path / "data.csv")
     assert is_refused(truepath("record", poses[1], *places, option, value), "more than 0")
+
+
+@pytest.mark.parametrize("payload_kg", ["inf", 1000])
+def test_no_payload_of_a_robot_is_refused(truepath, poses, tmp_path, payload_kg):
+    places = ("--robot-host", "127.0.2.95", "--tracker", "simulated", "-o", tmp_path / "data.csv")
+    assert is_refused(truepath("record", poses[1], *places, "--payload-kg", payload_kg), "no payload", "0 to 100 kg")
+
+
+def test_another_robot_behind_the_address_is_not_moved(record, at_home, tmp_path):
+    """The list does not say for which robot it was planned, and keeps the limits of both."""
+    before = moves(at_home)
+    outcome = record(at_home, "--yes", "--robot", "ur10", "--payload-kg", 0)
+    assert outcome.code == 1
+    assert "this is not a ur10" in outcome.err
+    assert "says that it is a UR5" in outcome.err
+    assert moves(at_home) == before
+    assert not (tmp_path / "data.csv").exists()
+
+
+def test_a_robot_that_nobody_has_published_is_told_to_be_unknown(at_home, ur5):
+    """Where its controller has base and flange is not known, so that nothing can be compared."""
+    X_BA = ur5.X_BA.copy()
+    X_BA[3:, 0, 3] += 0.01
+    with RobotLink(at_home.address) as link:
+        remark = require_same_robot(link, replace(ur5, X_BA=X_BA))
+    assert "nobody can tell whether this is a ur5" in remark
+    assert "says that it is a UR5" in remark
+
+
+def test_a_list_that_is_saved_anew_while_it_is_read_is_refused(record, at_home, poses, monkeypatch):
+    read = truepath.recording.record.read_pose_list
+
+    def read_and_save(path):
+        listed = read(path)
+        path.write_text(path.read_text().replace("\n1,1,", "\n9,1,"))
+        return listed
+
+    monkeypatch.setattr("truepath.recording.record.read_pose_list", read_and_save)
+    assert is_refused(record(at_home, "--yes"), "changed while it was read")
+
+
+def test_a_recording_whose_rows_do_not_fit_together_does_not_go_on(truepath, at_home, ur5, tmp_path):
+    """The readings of one were taken before the tracker was moved."""
+    q = HOME + np.random.default_rng(8).uniform(-0.3, 0.3, (8, 6))
+    listed = PoseList(q, np.ones(8, bool), np.arange(8))
+    (tmp_path / "list.csv").write_text(to_csv(listed))
+    sha256 = hashlib.sha256((tmp_path / "list.csv").read_bytes()).hexdigest()
+    p_ME = RealRobot("ur5_cell", SEED).reflector_poses(q)[:, :3, 3]
+    p_ME[4] += 0.5
+    with RowFile(tmp_path / "data.csv", listed, sha256, columns(6, False), resume=False) as rows:
+        for k in range(7):
+            reading = Reading(p_ME[k], None, 0.02, 99, 5.0)
+            zero = np.zeros(6)
+            rows.append(k, cells(Visit(k, k, q[k], q[k], zero, zero.astype(int), float(k), 0.0, reading)))
+    before = moves(at_home)
+    places = ("--robot-host", at_home.address, "--tracker", "simulated", "-o", tmp_path / "data.csv")
+    outcome = truepath("record", tmp_path / "list.csv", *places, "--robot", "ur5_cell", "--yes", "--resume")
+    assert outcome.code == 1
+    assert "visit 5 lies more than 20 mm" in outcome.err
+    assert moves(at_home) == before
 
 
 def stop_after_a_row(controller, path):

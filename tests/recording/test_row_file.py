@@ -1,5 +1,6 @@
 """Rows on the disk: what is there stays, half of a line goes, nothing is taken for what it is not."""
 
+import fcntl
 import json
 from dataclasses import replace
 
@@ -83,6 +84,39 @@ def test_resuming_knows_what_is_done_and_goes_on_behind_it(data):
     assert data.read_bytes().startswith(before)
     with opened(data, resume=True) as rows:
         assert rows.done == {0, 2, 3}
+
+
+def test_what_is_taken_over_can_be_held_against_what_comes(data):
+    with opened(data, resume=True) as rows:
+        assert rows.taken_over.row.tolist() == [0, 2]
+        assert np.allclose(rows.taken_over.q_rad, POSES.q_rad[[0, 2]], atol=1e-9)
+        assert np.allclose(rows.taken_over.p_ME, [[1, 2, 3], [1, 2, 5]])
+
+
+def test_a_row_of_other_columns_is_not_written(data):
+    before = data.read_bytes()
+    with opened(data, resume=True) as rows, pytest.raises(InputError, match="other columns"):
+        rows.append(3, cells(visit_of(3, np.eye(3))))
+    assert data.read_bytes() == before
+
+
+def test_who_comes_too_late_touches_nothing(tmp_path):
+    """The other has created the file, and has not written yet what it is a recording of."""
+    path = tmp_path / "data.csv"
+    with path.open("wb") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(InputError, match="somebody else"):
+            opened(path, resume=True)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_recorder_that_was_killed_as_it_began_leaves_a_file_to_begin_with(tmp_path):
+    path = tmp_path / "data.csv"
+    path.touch()
+    with opened(path, resume=True) as rows:
+        rows.append(0, cells(visit_of(0)))
+    with opened(path, resume=True) as rows:
+        assert rows.done == {0}
 
 
 def test_wherever_the_last_line_breaks_off_only_complete_rows_count(data):

@@ -147,6 +147,23 @@ def test_a_connection_that_is_lost_is_made_anew():
         assert np.isclose(tracker.reading(0.1).p_ME[0], 1e-3)
 
 
+def test_a_tracker_that_comes_back_with_other_columns_is_refused():
+    """Rows of another width, from a 6D probe where there was a reflector, would spoil the file."""
+    visits = itertools.count()
+
+    def other(connection):
+        is_first = next(visits) == 0
+        connection.sendall(HEADER if is_first else b"t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n")
+        for _ in range(40 if is_first else 10_000):
+            connection.sendall(now() if is_first else now().replace(b"\n", b",1,0,0,0\n"))
+            time.sleep(0.005)
+
+    with server(other) as spec, open_tracker(spec, "-") as tracker:
+        with pytest.raises(InputError, match="begun anew with other columns") as error:
+            tracker.reading(0.6)
+        assert error.value.expected == "positions"
+
+
 def test_a_silent_tracker_is_told_within_the_patience():
     with server(speaking(HEADER, line(1.0))) as spec, impatient(spec) as tracker:
         begin = time.monotonic()

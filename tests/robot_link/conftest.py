@@ -27,6 +27,7 @@ def only_link(controller):
 @pytest.fixture
 def link(controller, only_link):
     """A link to it; whatever happened to the robot before is over, and it is at home."""
+    only_link.give_control_back()
     controller.command({"do": "recover"})
     controller.command({"do": "stop"})
     controller.command({"do": "set", "q_rad": HOME})

@@ -166,7 +166,9 @@ def test_when_the_parent_dies_the_robot_stops(controller, link):
 
 def test_stopping_works_without_control_too(controller, link):
     link.send_program(f"def walk():\n  movej({FAR.tolist()}, a=1, v=0.05)\nend\n")
+    begin = time.monotonic()
     in_the_middle(controller, link.stop).join()
+    assert time.monotonic() - begin < 5.0  # it has begun: nothing else is waited for
     time.sleep(0.2)
     assert stands(controller)
 

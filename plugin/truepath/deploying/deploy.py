@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,13 +29,13 @@ from truepath.deploying.rehearsed_way import rehearsed_way
 from truepath.deploying.run_file import RunFile
 from truepath.deploying.sent_program import SentProgram, read_program, require_correction, robot_remarks
 from truepath.deploying.settings import Settings, settings_in
+from truepath.deploying.stall import Stall, may_stand
 from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.robot_link import RobotFault, RobotLink, RobotState
+from truepath.robot_link.tool import tcp_on_controller
 from truepath.virtual.controller.script_instructions import ScriptError
 
-LEAST_STALL_S, TIMES_THE_WAIT = 20.0, 2.0
-QUIET_S = 5.0
 SAME_RAD = 1e-3
 NO_TOOL = (0.0,) * 6
 
@@ -52,6 +51,7 @@ class DeployOptions:
         tool: TCP that the correction was made for where the program sets none, ``(6,)`` in m and rad; None: no tool.
         start_rad: joints from which the program is meant to start; None: at its first target.
         start_within_rad: how far any joint may be from there.
+        stall_s: for how long it may stand while the program runs; None: as the program's own waits suggest.
         timeout_s: for how long the robot may be silent.
     """
 
@@ -61,6 +61,7 @@ class DeployOptions:
     tool: tuple[float, ...] | None = None
     start_rad: tuple[float, ...] | None = None
     start_within_rad: float = math.radians(30.0)
+    stall_s: float | None = None
     timeout_s: float = 2.0
 
 
@@ -74,6 +75,8 @@ class Prepared:
         load: what the robot must carry; None if it cannot be told.
         tool: X_0T that must be set on the controller, ``(6,)``; None if it does not matter.
         state: of the robot when it was checked.
+        stall_s: so long it may stand while the program runs.
+        may_wait: if it stands for longer, that is told only: nobody knows what the program waits for.
         remarks: what a person should know.
     """
 
@@ -84,6 +87,8 @@ class Prepared:
     load: Load | None
     tool: Array | None
     state: RobotState
+    stall_s: float
+    may_wait: bool
     remarks: tuple[str, ...]
 
 
@@ -155,7 +160,7 @@ def prepare(path: str | Path, calibration: Calibration, link: RobotLink, options
         obstacles += start_obstacles(robot, state.q_rad, goal, options.start_within_rad, line)
     wanted_tool = _tool_of(rehearsal, settings, options)
     if not obstacles:  # last, because to ask takes a program on the controller
-        tcp = _tcp_of(link)
+        tcp = tcp_on_controller(link)
         obstacles += another_robot_obstacles(controller, calibration.robot.name, state, tcp, model_told(link))
         if wanted_tool is not None and not obstacles:
             obstacles += tcp_obstacles(tcp, wanted_tool)
@@ -163,11 +168,23 @@ def prepare(path: str | Path, calibration: Calibration, link: RobotLink, options
         raise NotReady(obstacles)
     untold += _open_end_remarks(rehearsal, settings)
     remarks += (*unknown, *untold)
-    return Prepared(program, rehearsal, calibration, controller, load, wanted_tool, state, tuple(remarks))
+    stall_s, may_wait = may_stand(rehearsal, options.stall_s)
+    return Prepared(
+        program, rehearsal, calibration, controller, load, wanted_tool, state, stall_s, may_wait, tuple(remarks)
+    )
 
 
-def run(prepared: Prepared, link: RobotLink, record: Path | None, watched: Watched) -> Outcome:
+def run(
+    prepared: Prepared, link: RobotLink, record: Path | None, watched: Watched, tell: Callable[[str], None]
+) -> Outcome:
     """Sends the program and follows it to its end.
+
+    Args:
+        prepared: see there.
+        link: to the robot.
+        record: where to write down what is seen.
+        watched: is told how it goes.
+        tell: gets what a person should hear at once.
 
     Raises:
         InputError: the record cannot be written.
@@ -178,8 +195,8 @@ def run(prepared: Prepared, link: RobotLink, record: Path | None, watched: Watch
     way = rehearsed_way(rehearsal, prepared.controller, prepared.state.q_rad)
     _require_still_ready(prepared, link)
     with RunFile(record) as rows:  # not before: a run that does not begin must not cost an older record
-        stall_s = max(LEAST_STALL_S, TIMES_THE_WAIT * rehearsal.longest_wait_s)
-        followed: Followed = send_and_follow(link, prepared.program.sent, passages, way, rows, stall_s, watched)
+        stall = Stall(prepared.stall_s, tell if prepared.may_wait else None)
+        followed: Followed = send_and_follow(link, prepared.program.sent, passages, way, rows, stall, watched)
     return outcome_of(rehearsal, followed, passages, prepared.calibration, prepared.controller)
 
 
@@ -187,7 +204,7 @@ def _require_still_ready(prepared: Prepared, link: RobotLink) -> None:
     """Somebody may have come near, or changed the controller, while the question was open."""
     _require_same_state(prepared, link)
     if prepared.tool is not None:
-        obstacles = tcp_obstacles(_tcp_of(link), prepared.tool)
+        obstacles = tcp_obstacles(tcp_on_controller(link), prepared.tool)
         if obstacles:
             raise NotReady(obstacles)
         _require_same_state(prepared, link)
@@ -223,20 +240,6 @@ def _open_end_remarks(rehearsal: Rehearsal, settings: Settings) -> list[str]:
         lines = ", ".join(map(str, settings.unclear))
         remarks.append(f"payload or tool that the program computes cannot be looked at: line {lines}")
     return remarks
-
-
-def _tcp_of(link: RobotLink) -> Array:
-    """``(6,)`` X_0T on the controller. Only its control script tells, which has ended when this returns."""
-    with RobotLink(link.host, link.timeout_s) as asking:
-        tcp = asking.tcp_offset()
-    if not np.isfinite(tcp).all():
-        raise RobotFault("the controller does not tell its TCP in numbers")
-    end = time.monotonic() + QUIET_S
-    while link.state().program_running:
-        if time.monotonic() > end:
-            raise RobotFault("the program that was asked for the TCP does not end")
-        time.sleep(0.02)
-    return tcp
 
 
 def _require_first_target(rehearsal: Rehearsal, program: SentProgram, options: DeployOptions) -> None:

@@ -12,16 +12,19 @@ import numpy as np
 from truepath.deploying.passages import Passages
 from truepath.deploying.rehearsed_way import RehearsedWay
 from truepath.deploying.run_file import RunFile
+from truepath.deploying.stall import Stall
+from truepath.errors import InputError
 from truepath.lie import Array
 from truepath.robot_link import RobotFault, RobotLink, RobotState
-from truepath.robot_link.guard import Guard
+from truepath.robot_link.guard import SILENCE_S, Guard
 from truepath.robot_link.interruptions import uninterrupted
 from truepath.robot_link.readiness import MODES, is_in_remote_control
 from truepath.robot_link.state import RUNNING_MODE
 from truepath.robot_link.stopping import RESTS_WITHIN_S, Rest
+from truepath.robot_link.text_ports import STARTS_WITHIN_S
 
 LOOK_EVERY_S = 0.04
-START_S = 10.0  # within which a program must be seen to run
+START_SILENCE_S = 5.0  # while a program is sent, nobody can say that he watches
 MOVED_RAD = 1e-6
 
 
@@ -63,7 +66,7 @@ def send_and_follow(
     passages: Passages,
     way: RehearsedWay,
     record: RunFile,
-    stall_s: float,
+    stall: Stall,
     watched: Watched,
 ) -> Followed:
     """Runs a program on a robot that was found ready.
@@ -76,27 +79,31 @@ def send_and_follow(
         passages: of its targets.
         way: on which it must stay.
         record: gets every sample.
-        stall_s: the robot may stand for so long while its program runs.
+        stall: what a robot that stands while its program runs means.
         watched: is told how it goes.
 
     Raises:
         RobotFault: the dashboard is silent, or the program could not be sent; says what is known of the robot.
+        InputError: the record cannot be begun.
     """
     if is_in_remote_control(link) is False:
         raise RobotFault("the robot is in local control: it can be stopped from the teach pendant only")
-    run, sent = _Run(link, passages, way, record, watched), False
     link.state()
     link.samples()
     with Guard(link.host) as guard:
+        run, sent = _Run(link, guard, passages, way, record, watched), False
         try:
+            guard.is_sending(silence_s=run.silence_s)
             link.send_program(text)
             sent = True
             run.until_started()
-            run.until_ended(stall_s)
+            run.until_ended(stall)
         except RobotFault as fault:
             run.stopped(fault.reason)
             if not sent:
                 raise RobotFault(run.followed.ended) from None
+        except InputError as error:  # the disk is full
+            run.stopped(f"the record cannot be written ({error.found or error.problem})")
         except KeyboardInterrupt:
             run.followed.interrupted = True
             run.stopped("stopped by Ctrl-C")
@@ -112,9 +119,11 @@ def send_and_follow(
 
 class _Run:
     def __init__(
-        self, link: RobotLink, passages: Passages, way: RehearsedWay, record: RunFile, watched: Watched
+        self, link: RobotLink, guard: Guard, passages: Passages, way: RehearsedWay, record: RunFile, watched: Watched
     ) -> None:
-        self.link, self.passages, self.way, self.record, self.watched = link, passages, way, record, watched
+        self.link, self.guard, self.passages, self.way = link, guard, passages, way
+        self.record, self.watched = record, watched
+        self.looked_s, self.silence_s = time.monotonic(), link.timeout_s + START_SILENCE_S
         self.followed = Followed()
         self.stands = False
         self.strayed: str | None = None
@@ -124,13 +133,15 @@ class _Run:
 
     def until_started(self) -> None:
         """The port does not answer: that the program has begun shows in the samples."""
-        end = time.monotonic() + START_S
+        end = time.monotonic() + STARTS_WITHIN_S
         while self.started_s is None:
             self.look()
             if time.monotonic() > end:
-                raise RobotFault(f"the robot has not started the program within {START_S:.0f} s: is it valid for it?")
+                raise RobotFault(
+                    f"the robot has not started the program within {STARTS_WITHIN_S:.0f} s: is it valid for it?"
+                )
 
-    def until_ended(self, stall_s: float) -> None:
+    def until_ended(self, stall: Stall) -> None:
         """A program is over when the robot says so and stands; one that is paused may go on."""
         rest, ran_s = Rest(), time.monotonic()
         while True:
@@ -142,8 +153,12 @@ class _Run:
                 ran_s = now_s
             if now_s - ran_s > RESTS_WITHIN_S:
                 raise RobotFault(f"the robot still moves {RESTS_WITHIN_S:.0f} s after its program has ended")
-            if now_s - self.moved_s > stall_s:
-                raise RobotFault(f"the robot has stood for {stall_s:.0f} s while its program runs")
+            if now_s - self.moved_s > stall.after_s:
+                stands = f"the robot has stood for {stall.after_s:.0f} s while its program runs"
+                if stall.tell is None:
+                    raise RobotFault(stands)
+                stall.tell(stands)
+                self.moved_s = now_s
         self.stands = True
         self.followed.ended, self.followed.completed = "completed", True
 
@@ -154,7 +169,10 @@ class _Run:
             RobotFault: the robot was stopped, is lost, or goes where it was not to go.
         """
         time.sleep(LOOK_EVERY_S)
+        self._require_watched()
         try:
+            if not self.link.is_reading:
+                raise RobotFault("the client of the robot has gone")
             state, samples = self.link.state(), self.link.samples()
         except RobotFault as fault:
             raise RobotFault(f"the connection was lost ({fault.reason})") from None
@@ -164,6 +182,17 @@ class _Run:
         if self.strayed is not None:
             raise RobotFault(self.strayed)
         return state
+
+    def _require_watched(self) -> None:
+        """Raises RobotFault if this process was held up, so that the guard has had to stop the robot."""
+        now_s, before_s = time.monotonic(), self.looked_s
+        self.looked_s = now_s
+        silence_s, self.silence_s = self.silence_s, SILENCE_S
+        if now_s - before_s > silence_s:
+            raise RobotFault(
+                f"this process was held up for {now_s - before_s:.0f} s, in which nobody watched the robot"
+            )
+        self.guard.watched(has_started=self.link.sent_program_has_begun)
 
     def take(self, samples: list[RobotState]) -> None:
         if not samples:
@@ -200,10 +229,14 @@ class _Run:
                 self.link.stop()
             except RobotFault as fault:
                 self.followed.ended += f"; it was told to stop, but {fault.reason}"
+                if self.guard.is_left:
+                    self.followed.ended += (
+                        "; a process in the background goes on telling it to stop, for an hour or until it does"
+                    )
             else:
                 self.stands = True
                 self.followed.ended += "; it was told to stop and stands"
-            with contextlib.suppress(RobotFault):
+            with contextlib.suppress(RobotFault, InputError):
                 self.take(self.link.samples())
 
     def finish(self) -> None:

@@ -46,6 +46,8 @@ def print_outcome(outcome: Outcome) -> None:
         )
         console.warn(f"nothing was seen of the robot for {followed.gap_s:.2f} s: {passed}")
     _print_targets(outcome)
+    if not followed.completed:
+        console.warn("what the program has switched on stays on: see to torch, gripper and other outputs")
     if not outcome.as_planned and followed.last is not None:
         console.complain(f"joints last seen at {_angles(np.degrees(followed.last.q_rad))} deg")
 

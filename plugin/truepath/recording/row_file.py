@@ -19,6 +19,7 @@ from truepath.files import write_atomically
 from truepath.measurements import from_table
 from truepath.planning.pose_list import PoseList
 from truepath.recording.circumstances import Circumstances
+from truepath.recording.visit import Recorded
 from truepath.tables import Table, read_table
 
 SCHEMA = "truepath.recording/1"
@@ -41,10 +42,13 @@ class RowFile:
             complete, and its pose is measured again.
         circumstances: written down in a new file, and compared with those of one that goes on.
 
+    Attributes:
+        done: rows of the list that have been measured.
+        taken_over: what was there already.
+
     Raises:
-        InputError: the file exists and nothing was said of resuming; it belongs to another list, or
-            other circumstances; a row is not one of
-            this list; somebody else is recording into it.
+        InputError: the file exists and nothing was said of resuming; it belongs to another list, or other
+            circumstances; a row is not one of this list; somebody else is recording into it.
     """
 
     def __init__(
@@ -59,21 +63,25 @@ class RowFile:
     ) -> None:
         self.path, self._poses, self._header = path, poses, list(header)
         self.done: set[int] = set()
+        self.taken_over = Recorded(np.empty(0, int), np.empty((0, poses.q_rad.shape[1])), np.empty((0, 3)))
         self._last_time_s = 0.0
         require_free(path, resume=resume)
-        exists = path.exists()
-        self._is_new = not exists
         side_file = progress_file(path)
-        if exists:
-            self._began_s = _read_progress(side_file, path, poses_sha256, circumstances)
-        else:
-            self._began_s = time.time()
-            content: dict[str, Any] = {"schema": SCHEMA, "poses_sha256": poses_sha256, "began_unix_s": self._began_s}
-            content["circumstances"] = circumstances.as_json()
-            write_atomically(side_file, json.dumps(content, indent=1) + "\n")
-        self._handle = _open(path)
+        existed, self._is_new = path.exists(), False
+        self._handle = _open(path)  # and locked: whoever comes too late must not touch the other file either
         try:
-            if exists:
+            is_empty = os.fstat(self._handle).st_size == 0
+            if not (resume or is_empty):
+                raise _exists(path)
+            # An empty file without the other is one whose recorder was killed as it began.
+            self._is_new = is_empty and not (existed and side_file.exists())
+            if self._is_new:
+                self._began_s = time.time()
+                content: dict[str, Any] = {"schema": SCHEMA, "poses_sha256": poses_sha256}
+                content |= {"began_unix_s": self._began_s, "circumstances": circumstances.as_json()}
+                write_atomically(side_file, json.dumps(content, indent=1) + "\n")
+            else:
+                self._began_s = _read_progress(side_file, path, poses_sha256, circumstances)
                 self._take_over()
             if os.fstat(self._handle).st_size == 0:
                 self._write(self._header)
@@ -97,9 +105,12 @@ class RowFile:
         """Writes the visit of a row of the list to the disk.
 
         Raises:
-            InputError: the disk does not take it.
+            InputError: the disk does not take it; it does not have the columns of the file.
         """
         assert row not in self.done
+        if len(cells) != len(self._header):
+            expected, found = f"{len(self._header)} cells", str(len(cells))
+            raise InputError("a row of other columns", file=self.path, expected=expected, found=found)
         self._write(cells)
         self.done.add(row)
 
@@ -141,8 +152,11 @@ class RowFile:
         data = from_table(table, self._poses.q_rad.shape[1])
         assert data.time_s is not None
         self._last_time_s = float(data.time_s[-1])
+        rows = []
         for k, cell in enumerate(table.text("visit")):
-            self.done.add(self._row_of(table, k, cell, data.q_rad[k]))
+            rows.append(self._row_of(table, k, cell, data.q_rad[k]))
+            self.done.add(rows[-1])
+        self.taken_over = Recorded(np.array(rows), data.q_rad, data.p_ME)
 
     def _row_of(self, table: Table, k: int, cell: str, q_rad: np.ndarray) -> int:
         """The row of the list that a row of the data is a visit of."""
@@ -167,7 +181,11 @@ class RowFile:
 def require_free(path: Path, *, resume: bool) -> None:
     """Raises InputError for an output that would have to be overwritten."""
     if path.exists() and not (resume and path.is_file()):
-        raise InputError("the output exists", file=path, expected="a new file, or --resume to go on with this one")
+        raise _exists(path)
+
+
+def _exists(path: Path) -> InputError:
+    return InputError("the output exists", file=path, expected="a new file, or --resume to go on with this one")
 
 
 def progress_file(path: Path) -> Path:
@@ -176,12 +194,15 @@ def progress_file(path: Path) -> Path:
 
 
 def _open(path: Path) -> int:
+    """The file, locked."""
     try:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
     except OSError as error:
         raise InputError("cannot write here", file=path, found=error.strerror) from None
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if not os.path.samestat(os.fstat(handle), path.stat()):  # its first owner has just taken it away
+            raise OSError
     except OSError:
         os.close(handle)
         raise InputError("somebody else is recording into this file", file=path) from None

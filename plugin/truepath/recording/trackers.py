@@ -66,6 +66,7 @@ class LineTracker:
         self._lock = threading.Lock()
         self._fault: InputError | None = None
         self._lost: str | None = None
+        self._columns_have_orientation: bool | None = None
         self._broken = False
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._listen, daemon=True)
@@ -161,9 +162,25 @@ class LineTracker:
         finally:
             self._source.close()
 
+    def _require_same_columns(self) -> None:
+        """A tracker that is started anew begins with a header again: rows of a file must all be of one kind."""
+        now = self._reader.gives_orientation
+        if self._columns_have_orientation is None:
+            self._columns_have_orientation = now
+        elif now not in (None, self._columns_have_orientation):
+            kinds = {False: "positions", True: "positions and orientations"}
+            raise InputError(
+                "the tracker has begun anew with other columns",
+                file=self._source.name,
+                line=1,
+                expected=kinds[self._columns_have_orientation],
+                found=kinds[now],
+            )
+
     def _take(self, arrived_s: float, data: bytes) -> int:
         """Keeps the readings of some bytes with the moments when they were taken; returns how many."""
         lines = self._reader.feed(data)
+        self._require_same_columns()
         if not lines:
             return 0
         clock = np.array([line.numbers[0] for line in lines if line.numbers is not None])

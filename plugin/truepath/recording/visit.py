@@ -36,6 +36,21 @@ class Visit:
     reading: Reading
 
 
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Visits that are on the disk.
+
+    Attributes:
+        row: ``(K,)`` of the pose list, from 0.
+        q_rad: ``(K, n)`` commanded joints.
+        p_ME: ``(K, 3)`` what the tracker said, m.
+    """
+
+    row: Array
+    q_rad: Array
+    p_ME: Array
+
+
 def columns(num_joints: int, with_orientation: bool) -> list[str]:
     """The header: what the design document names, then what else is known, which ``calibrate`` passes over."""
     joints = range(1, num_joints + 1)

@@ -9,12 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from truepath.robot_link.fault import RobotFault
+    from truepath.robot_link.fault import ControlLost, RobotFault
     from truepath.robot_link.link import RobotLink
     from truepath.robot_link.state import RobotState
 
-__all__ = ["RobotFault", "RobotLink", "RobotState"]
-PLACES = {"RobotFault": "fault", "RobotLink": "link", "RobotState": "state"}
+__all__ = ["ControlLost", "RobotFault", "RobotLink", "RobotState"]
+PLACES = {"ControlLost": "fault", "RobotFault": "fault", "RobotLink": "link", "RobotState": "state"}
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,7 @@
-"""Signals of a person who wants an end: Ctrl-C, a closed terminal, ``kill``. They must not cut a stop short."""
+"""Signals of a person who wants an end: Ctrl-C, a closed terminal, ``kill``. They must not cut a stop short.
+
+Ctrl-Z is one of them: a process that is suspended watches no robot.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGTSTP") if hasattr(signal, name))
 
 
 @contextmanager

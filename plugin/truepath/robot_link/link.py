@@ -7,36 +7,35 @@ every call here ends in time whatever becomes of them.
 
 from __future__ import annotations
 
-import contextlib
-import threading
 import time
-from collections import deque
+from collections.abc import Callable
 from types import TracebackType
-from typing import Any
 
 import numpy as np
 
 from truepath.lie import Array
 from truepath.robot_link import text_ports
-from truepath.robot_link.child_process import ChildProcess, Message, wait_for
-from truepath.robot_link.fault import RobotFault
-from truepath.robot_link.interruptions import deferred, uninterrupted
+from truepath.robot_link.child_process import Message
+from truepath.robot_link.control import Control
+from truepath.robot_link.fault import ControlLost, RobotFault
+from truepath.robot_link.interruptions import uninterrupted
+from truepath.robot_link.reading import Reading
 from truepath.robot_link.state import RobotState, from_sample
-from truepath.robot_link.stopping import STOP_PROGRAM, Way, bring_to_rest
+from truepath.robot_link.stopping import Way, bring_to_rest
+from truepath.robot_link.text_ports import STARTS_WITHIN_S, STOP_PROGRAM
 
 RATE_HZ = 125.0
-UNREAD_SAMPLES = int(120 * RATE_HZ)
 AT_GOAL_RAD = 1e-4
 AT_GOAL_M = 1e-4
 AT_REST_RAD_S = 0.02
 TIMES_AS_LONG = 1.5  # a move may take, besides what the speed slider does to it
 SLOWEST_FRACTION = 0.02
-STARTS_TRIED = 3
-POLL_S = 0.002
-START_S = 12.0  # the client uploads its script and waits for it to run
+START_S = 12.0
 STOP_LIMIT_S = 10.0
 STOP_ANSWER_S = 1.0  # while a robot moves that is to stop, nothing is waited for for long
 STOP_CONTROL_S = 4.0
+WATCHED_EVERY_S, SILENCE_S = 0.5, 3.0  # of a move: after such a silence of this process its child ends it
+NAMED_WITHIN_S = 0.4  # a safety stop ends the program first, and is named a little later
 
 
 class RobotLink:
@@ -52,13 +51,10 @@ class RobotLink:
     """
 
     def __init__(self, host: str, timeout_s: float = 5.0, rate_hz: float = RATE_HZ) -> None:
-        self.host, self.timeout_s, self._rate_hz = host, timeout_s, rate_hz
-        self._samples: deque[Message] = deque(maxlen=UNREAD_SAMPLES)
-        self._lock = threading.Lock()
-        self._newest: Message | None = None
-        self._fault: str | None = None
-        self._reading: ChildProcess | None = None
-        self._control: ChildProcess | None = None
+        self.host, self.timeout_s = host, timeout_s
+        self._reading = Reading(host, rate_hz)
+        self._control = Control(host, timeout_s, self._clear)
+        self._sent_s: float | None = None
         self._tcp_offset: Array | None = None
 
     def __enter__(self) -> RobotLink:
@@ -67,24 +63,30 @@ class RobotLink:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether samples are being read; the next one would have to wait for a new connection otherwise."""
+        return self._reading.is_on
+
+    @property
+    def sent_program_has_begun(self) -> bool:
+        """Whether a program has begun to run since ``send_program``."""
+        return self._sent_s is None or self._has_begun_before(time.monotonic())
+
+    def _has_begun_before(self, moment_s: float) -> bool:
+        began_s = self._reading.first_began_s
+        return began_s is not None and began_s < moment_s
+
     def state(self) -> RobotState:
         """The first sample that arrives after the call: what happened before the call is in it."""
         return self._state(self.timeout_s, max(START_S, self.timeout_s))
 
     def _state(self, within_s: float, start_s: float) -> RobotState:
-        self._start_reading(start_s)
-        asked_s = time.monotonic()
-        if not wait_for(lambda: self._is_after(asked_s) or self._is_lost(), within_s, POLL_S) or self._is_lost():
-            raise RobotFault(f"{self.host}: {self._fault or f'no data from the robot for {within_s:.1f} s'}")
-        assert self._newest is not None
-        return from_sample(self._newest, self._tcp_offset)
+        return from_sample(self._reading.newest(within_s, start_s), self._tcp_offset)
 
     def samples(self) -> list[RobotState]:
         """All samples since the last call, of the last two minutes at most; empty when the robot sends nothing."""
-        self._start_reading(max(START_S, self.timeout_s))
-        with self._lock:
-            taken = list(self._samples)
-            self._samples.clear()
+        taken = self._reading.take(max(START_S, self.timeout_s))
         return [from_sample(sample, self._tcp_offset) for sample in taken]
 
     def move_joints(self, q_rad: Array, speed_rad_s: float, acceleration_rad_s2: float) -> None:
@@ -108,24 +110,55 @@ class RobotLink:
         )
 
     def tcp_offset(self) -> Array:
-        """``(6,)`` tool on the flange as set on the controller. Takes control: a running program ends."""
-        self._tcp_offset = np.array(self._ask({"do": "tcp_offset"}, self.timeout_s), float)
+        """``(6,)`` tool on the flange as set on the controller. Takes control: a running program ends.
+
+        Raises:
+            ControlLost: control was held and is lost.
+        """
+        self._control.require(self._reading.plays_since_s)
+        self._tcp_offset = np.array(self._control.ask({"do": "tcp_offset"}, self.timeout_s), float)
         return self._tcp_offset
 
     def stop(self) -> None:
         """Stops the robot by every way there is, until it is seen to stand and no program runs on it.
 
-        Signals that would interrupt are nothing meanwhile; it takes a limited time.
+        A program that was sent and has not been seen to begin is waited for, and stopped when it does. Signals that
+        would interrupt are nothing meanwhile; it takes a limited time.
 
         Raises:
             RobotFault: it was not seen to come to rest; says what is known.
         """
-        text_ways: list[Way] = [("dashboard", self._stop_by_dashboard), ("script port", self._stop_by_program)]
+        dashboard: Way = ("dashboard", self._stop_by_dashboard)
+        script: Way = ("script port", self._stop_by_program)
         control: Way = ("control script", self._stop_by_control)
-        is_in_control = self._control is not None and self._control.alive
-        ways = [control, *text_ways] if is_in_control else [*text_ways, control]
+        if self._control.is_on:
+            ways = [control, dashboard, script]
+        elif self.sent_program_has_begun:
+            ways = [dashboard, script, control]
+        else:  # it comes by that port: what is sent there now comes after it, as a rule
+            ways = [script, dashboard]
+        asked_s = time.monotonic()  # what begins later may be the program that stops
+
+        def may_start() -> bool:
+            until_s = 0.0 if self._sent_s is None else self._sent_s + STARTS_WITHIN_S
+            return time.monotonic() < until_s and not self._has_begun_before(asked_s)
+
         with uninterrupted():
-            bring_to_rest(lambda: self._state(STOP_ANSWER_S, STOP_CONTROL_S), ways, STOP_LIMIT_S)
+            bring_to_rest(self._look, ways, STOP_LIMIT_S, may_start)
+            self._sent_s = None
+
+    def _clear(self, late_s: float) -> None:
+        """Sees that a script which may be on its way does not stay."""
+        ways: list[Way] = [("script port", self._stop_by_program), ("dashboard", self._stop_by_dashboard)]
+        until_s = time.monotonic() + late_s
+        bring_to_rest(self._look, ways, late_s, lambda: time.monotonic() < until_s)
+
+    def _look(self) -> RobotState:
+        try:
+            return self._state(STOP_ANSWER_S, STOP_CONTROL_S)
+        except RobotFault:
+            self._reading.close()  # it may be its fault: the next look is by another
+            raise
 
     def _stop_by_dashboard(self) -> str:
         return text_ports.ask_dashboard(self.host, "stop", STOP_ANSWER_S)
@@ -137,16 +170,23 @@ class RobotLink:
     def _stop_by_control(self) -> str:
         """Takes control if this link has none: what runs on the robot is replaced. Gives it back, either way."""
         try:
-            self._start_control(1, STOP_CONTROL_S)
-            self._ask({"do": "stop"}, STOP_CONTROL_S)
+            self._control.take(1, STOP_CONTROL_S)
+            self._control.ask({"do": "stop"}, STOP_CONTROL_S)
         finally:
-            self._end_control()
+            self._control.give_back()
         return ""
 
     def send_program(self, text: str) -> None:
-        """Sends a URScript program to the controller, which starts it at once."""
-        self._end_control()
+        """Sends a URScript program to the controller, which starts it at once, or a little later."""
+        self.give_control_back()
+        self.state()  # a robot that cannot be seen gets none
+        self._reading.expect_program()
+        self._sent_s = time.monotonic()
         text_ports.send_program(self.host, text, self.timeout_s)
+
+    def give_control_back(self) -> None:
+        """Ends the control script of this link, if there is one; it may be taken anew."""
+        self._control.give_back()
 
     def dashboard(self, question: str) -> str:
         """The answer of the dashboard, one line."""
@@ -154,22 +194,23 @@ class RobotLink:
 
     def close(self) -> None:
         """Ends both children. A robot that moves by order of this link stops."""
-        self._end_control()
-        if self._reading is not None:
-            self._reading.kill()
-            self._reading = None
+        self.give_control_back()
+        self._reading.close()
 
-    def _move(self, request: Message, is_there: Any, duration_s: float) -> None:
+    def _move(self, request: Message, is_there: Callable[[RobotState], bool], duration_s: float) -> None:
         before = self.state()
         if not before.able_to_move:
             raise RobotFault(_unable(before))
+        self._control.require(self._reading.plays_since_s)
+        before = self.state()  # by now it is known when the control script has begun
+        program_began_s = self._reading.began_s
         try:
-            if self._ask(request, self.timeout_s) is not True:
-                # The client's script has ended meanwhile, by a stop that is over or another program: once more, anew.
-                self._end_control()
-                if self._ask(request, self.timeout_s) is not True:
-                    raise RobotFault(f"the robot refuses to move; {_unable(self.state())}")
-            self._follow_move(before, is_there, duration_s)
+            if self._control.ask({**request, "silence_s": SILENCE_S}, self.timeout_s) is not True:
+                raise self._why_not_playing() or RobotFault(f"the robot refuses to move; {_unable(self.state())}")
+            self._follow_move(before, program_began_s, is_there, duration_s)
+            self._control.tell({"do": "arrived"})
+        except ControlLost:  # what runs there is not ours
+            raise
         except BaseException as error:  # Ctrl-C too: whatever happened, nobody is watching this move any more
             with uninterrupted():
                 known = self._stopped()
@@ -186,11 +227,17 @@ class RobotLink:
         except RobotFault as fault:
             return f"it was told to stop, but {fault.reason}"
         finally:
-            self._end_control()
+            self.give_control_back()
         return "it was told to stop and stands"
 
-    def _follow_move(self, state: RobotState, is_there: Any, duration_s: float) -> None:
-        began_s = moved_s = time.monotonic()
+    def _follow_move(
+        self,
+        state: RobotState,
+        program_began_s: float | None,
+        is_there: Callable[[RobotState], bool],
+        duration_s: float,
+    ) -> None:
+        began_s = moved_s = told_s = time.monotonic()
         while True:
             previous, state = state, self.state()
             now_s = time.monotonic()
@@ -200,85 +247,33 @@ class RobotLink:
                 return
             if np.abs(state.q_target_rad - previous.q_target_rad).max() > 0.0:
                 moved_s = now_s
-            if self._control is None or not self._control.alive:
-                raise RobotFault(self._control.last_words() if self._control else "the link was closed in a move")
+            if not self._control.is_on:
+                raise RobotFault(self._control.last_words())
+            if now_s - told_s > WATCHED_EVERY_S:
+                self._control.tell({"do": "watched"})
+                told_s = now_s
+            if self._reading.began_s != program_began_s:
+                raise self._control.why_lost()
+            if not state.program_running and (why := self._why_not_playing()) is not None:
+                raise why
             if now_s - moved_s > self.timeout_s:
+                if state.program_plays and (why := self._control.why_silent()) is not None:
+                    raise why
                 raise RobotFault(f"the robot has stood short of its goal for {self.timeout_s:.1f} s")
             allowed_s = TIMES_AS_LONG * duration_s / max(state.speed_fraction, SLOWEST_FRACTION) + self.timeout_s
             if now_s - began_s > allowed_s:
                 raise RobotFault(f"a move of {duration_s:.1f} s has not ended after {allowed_s:.1f} s")
 
-    def _ask(self, request: Message, timeout_s: float) -> Any:
-        control = self._start_control()
-        try:
-            control.send(request)
-            return control.answer(timeout_s, str(request["do"]).replace("_", " "))
-        except RobotFault:
-            self._end_control()
-            raise
-
-    def _start_control(self, tries: int = STARTS_TRIED, patience_s: float | None = None) -> ChildProcess:
-        if self._control is not None and self._control.alive:
-            return self._control
-        for attempt in range(tries):
-            control = ChildProcess("truepath.robot_link.control_child", [self.host])
-            try:
-                control.answer(patience_s or max(START_S, self.timeout_s), "taking control of the robot")
-                self._control = control
-                return control
-            except RobotFault:
-                # A client that has just been killed may still hold the controller's registers.
-                self._abandon(control)
-                if attempt == tries - 1:
-                    raise
-                time.sleep(0.5)
-            except BaseException:
-                self._abandon(control)
-                raise
-        raise AssertionError("unreachable")
-
-    def _abandon(self, control: ChildProcess) -> None:
-        """Ends a client that has not come so far as to answer. What it has sent meanwhile must not stay there."""
-        with deferred():
-            gave_up_itself = control.gave_up_itself
-            control.kill()
-            if not gave_up_itself:  # else nothing was sent, and what runs on the robot is not ours
-                with contextlib.suppress(RobotFault):
-                    self._stop_by_program()
-
-    def _end_control(self) -> None:
-        control, self._control = self._control, None
-        if control is not None:
-            with deferred():
-                with contextlib.suppress(RobotFault):
-                    control.send({"do": "close"})
-                control.close()
-
-    def _start_reading(self, start_s: float) -> None:
-        if self._reading is not None and self._reading.alive:
-            return
-        self._newest, self._fault = None, None
-        arguments = [self.host, str(self._rate_hz)]
-        self._reading = ChildProcess("truepath.robot_link.reading_child", arguments, self._receive)
-        if not wait_for(lambda: self._newest is not None or self._is_lost(), start_s):
-            self._reading.kill()
-            raise RobotFault(f"{self.host} does not answer: no data within {start_s:.0f} s")
-        if self._is_lost():
-            raise RobotFault(f"{self.host} cannot be read: {self._fault or self._reading.last_words()}")
-
-    def _receive(self, message: Message) -> None:
-        if "error" in message:
-            self._fault = str(message["error"])
-        for sample in message.get("samples", ()):
-            with self._lock:
-                self._samples.append(sample)
-            self._newest = sample
-
-    def _is_after(self, moment_s: float) -> bool:
-        return self._newest is not None and self._newest["arrived_s"] > moment_s
-
-    def _is_lost(self) -> bool:
-        return self._fault is not None or self._reading is None or not self._reading.alive
+    def _why_not_playing(self) -> RobotFault | None:
+        """Why the control script does not run any more; None if it does."""
+        end_s = time.monotonic() + NAMED_WITHIN_S
+        while time.monotonic() < end_s:
+            state = self.state()
+            if not state.able_to_move:
+                return RobotFault(_unable(state))
+            if state.program_plays:
+                return None
+        return self._control.why_lost()
 
 
 def duration_of_move(distance: float, speed: float, acceleration: float) -> float:

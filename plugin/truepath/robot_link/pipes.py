@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
@@ -50,16 +51,18 @@ class Pipes:
         """What the parent asks for, until it closes the pipe or dies.
 
         Args:
-            meanwhile: called while nothing is asked for.
+            meanwhile: called between requests, however many there are.
             every_s: how often; None for never.
         """
-        unread = b""
+        unread, called_s = b"", time.monotonic()
         while True:
-            if not select.select([sys.stdin], [], [], every_s)[0]:
+            left_s = None if every_s is None else max(0.0, called_s + every_s - time.monotonic())
+            if select.select([sys.stdin], [], [], left_s)[0]:
+                part = os.read(sys.stdin.fileno(), 65536)
+                if not part:
+                    return
+                *lines, unread = (unread + part).split(b"\n")
+                yield from (json.loads(line) for line in lines)
+            if every_s is not None and time.monotonic() >= called_s + every_s:
+                called_s = time.monotonic()
                 meanwhile()
-                continue
-            part = os.read(sys.stdin.fileno(), 65536)
-            if not part:
-                return
-            *lines, unread = (unread + part).split(b"\n")
-            yield from (json.loads(line) for line in lines)

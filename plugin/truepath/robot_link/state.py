@@ -11,6 +11,7 @@ import numpy as np
 from truepath.lie import Array
 
 RUNNING_MODE = 7  # robot_mode RUNNING of the RTDE guide: power on, brakes released
+PLAYING = 2  # runtime_state of the RTDE guide
 ENDED = (0, 1)  # runtime_state stopping, stopped; a program that is pausing, paused or resuming is not over
 SAFETY_MODES = {
     1: "normal",
@@ -53,6 +54,7 @@ class RobotState:
         safety: normal, reduced, protective_stop, recovery, safeguard_stop, emergency_stop, violation, fault,
             safety_stop or unknown.
         program_running: whether there is a program on the controller that has begun and not ended; it may be paused.
+        program_plays: it is not paused.
         speed_fraction: by how much the speed slider slows moves down, 1 for not at all.
         payload_kg, payload_cog_m: None from a controller older than PolyScope 5.11, which does not tell.
     """
@@ -71,6 +73,7 @@ class RobotState:
     payload_kg: float | None = None
     payload_cog_m: Array | None = None
     tcp_offset: Array | None = None
+    program_plays: bool = False
 
     @property
     def able_to_move(self) -> bool:
@@ -95,6 +98,7 @@ def from_sample(sample: Mapping[str, Any], tcp_offset: Array | None = None) -> R
         payload_kg=sample["payload_kg"],
         payload_cog_m=None if cog is None else np.array(cog),
         tcp_offset=tcp_offset,
+        program_plays=int(sample["runtime_state"]) == PLAYING,
     )
 
 

@@ -16,8 +16,8 @@ STANDS_FOR_S = 0.3
 LEAST_SAMPLES = 5
 OBEYS_WITHIN_S = 1.2  # a way that has shown nothing by then has failed, and the next one is tried
 RESTS_WITHIN_S = 3.0  # once no program runs any more
+STOPS_ITSELF_S = 0.2  # the program that only stops; another one that has started since goes on for longer
 RETRY_S = 0.1
-STOP_PROGRAM = "def truepath_stop():\n  stopj(2)\nend\n"
 
 Way = tuple[str, Callable[[], str]]
 
@@ -41,13 +41,16 @@ class Rest:
         return long_enough and len(self._window) >= LEAST_SAMPLES
 
 
-def bring_to_rest(look: Callable[[], RobotState], ways: Sequence[Way], limit_s: float) -> None:
+def bring_to_rest(
+    look: Callable[[], RobotState], ways: Sequence[Way], limit_s: float, may_start: Callable[[], bool] = lambda: False
+) -> None:
     """Tries one way after the other, over and over, until the robot is seen to stand without a program.
 
     Args:
         look: gives a sample that is newer than the call.
         ways: names, and functions that tell the robot to stop and say what it answered.
-        limit_s: no way is begun later.
+        limit_s: no way is begun later, counted from when no program may start any more.
+        may_start: whether a program that was sent may still start; rest is not the end of it then.
 
     Raises:
         RobotFault: it was not seen to stand within the time; says what is known.
@@ -60,27 +63,32 @@ def bring_to_rest(look: Callable[[], RobotState], ways: Sequence[Way], limit_s: 
             answers[name] = tell()
         except RobotFault as fault:
             answers[name] = fault.reason
-        seen = _watch(look)
+        seen = _watch(look, may_start)
         if seen is None:
             return
-        if time.monotonic() >= end:
+        if may_start():
+            end = time.monotonic() + limit_s
+        elif time.monotonic() >= end:
             told = "; ".join(f"{way}: {answer or 'told'}" for way, answer in answers.items())
             raise RobotFault(f"{seen} ({told})")
         turn += 1
         time.sleep(RETRY_S)
 
 
-def _watch(look: Callable[[], RobotState]) -> str | None:
+def _watch(look: Callable[[], RobotState], may_start: Callable[[], bool]) -> str | None:
     """None when the robot stands, else what is seen of it in the end."""
-    rest, began_s = Rest(), time.monotonic()
+    rest, began_s, has_rested = Rest(), time.monotonic(), False
     while True:
         try:
             state = look()
         except RobotFault as fault:
             return f"it cannot be seen, so that whether it still moves is not known: {fault.reason}"
         if rest.take(state):
-            return None
-        within_s = OBEYS_WITHIN_S if state.program_running else RESTS_WITHIN_S
+            if not may_start():
+                return None
+            has_rested, began_s = True, time.monotonic()
+        obeys_s = STOPS_ITSELF_S if has_rested else OBEYS_WITHIN_S
+        within_s = obeys_s if state.program_running else RESTS_WITHIN_S
         if time.monotonic() - began_s > within_s:
             slow = (np.abs(state.speed_rad_s) <= STANDS_RAD_S).all()
             return ("it stands for now" if slow else "it still moves") + (

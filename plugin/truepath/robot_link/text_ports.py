@@ -11,6 +11,8 @@ from truepath.robot_link.fault import RobotFault
 DASHBOARD_PORT, SCRIPT_PORT = 29999, 30003
 LONGEST_ANSWER = 4096
 LINGER_S = 0.3
+STARTS_WITHIN_S = 10.0  # from the arrival of a program until it runs
+STOP_PROGRAM = "def truepath_stop():\n  stopj(2)\nend\n"
 
 
 def ask_dashboard(host: str, question: str, timeout_s: float) -> str:
