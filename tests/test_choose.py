@@ -34,7 +34,7 @@ def soft_and_wavy(real_ur5):
 # What is there
 
 
-@pytest.mark.parametrize("seed", [5, 6, 7])
+@pytest.mark.parametrize("seed", [5, pytest.param(6, marks=pytest.mark.slow), pytest.param(7, marks=pytest.mark.slow)])
 def test_nothing_is_chosen_where_nothing_is_hidden(real_ur5, seed):
     choice = chosen(real_ur5.robot, Hidden(real_ur5, none).measured(200, seed, recorded=True))
     assert (choice.named, choice.nameless) == ((), ())

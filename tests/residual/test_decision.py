@@ -19,6 +19,11 @@ from truepath.residual.proof import Proof, cross_validated
 from truepath.splits import BLOCKS_PER_PART, random_parts
 
 
+def also_slow(seed):
+    """More of the same, for those who have time."""
+    return pytest.param(seed, marks=pytest.mark.slow)
+
+
 @pytest.fixture(scope="module")
 def odd():
     """A robot with an error that no cause explains, 0.1 mm."""
@@ -105,7 +110,7 @@ def test_the_accuracy_stated_for_new_poses_is_the_one_they_turn_out_to_have(lear
 # It does not enter
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, *map(also_slow, (2, 3, 4))])
 def test_of_a_robot_with_nothing_but_noise_it_is_left_out_and_says_why(ur5, seed):
     data = campaign(arm(seed), joints(100, seed), size_m=0.0, seed=seed)
     learnt = learn(ur5, data, network=QUICK)
@@ -123,7 +128,7 @@ def test_a_calibration_from_which_it_is_left_out_is_the_one_without(ur5):
     assert with_it.model_copy(update=moment) == without.model_copy(update=moment)
 
 
-@pytest.mark.parametrize("seed", [0, 3])  # where so small an evolution learns the groups
+@pytest.mark.parametrize("seed", [0, also_slow(3)])  # where so small an evolution learns the groups
 def test_what_close_neighbours_in_time_have_in_common_is_not_taken_for_something_that_goes_with_the_pose(ur5, seed):
     """Poses measured one after the other lie close together, and the tracker moved between the groups.
 
@@ -140,7 +145,7 @@ def test_what_close_neighbours_in_time_have_in_common_is_not_taken_for_something
     assert not cross_validated(trial, _fit(ur5, data), QUICK).holds
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, also_slow(1)])
 def test_a_slow_drift_is_not_taken_for_something_that_goes_with_the_pose_where_poses_were_measured_in_order(ur5, seed):
     """Sorted by joint 1, the pose tells the time; a network must be better than the time alone."""
     q = joints(250, seed)
@@ -166,7 +171,7 @@ def test_of_too_few_poses_nothing_is_learnt(ur5, odd, count):
     assert learnt.network == TOO_FEW
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, also_slow(1)])
 def test_noise_of_the_orientations_is_no_reason_to_leave_networks_out(ur5, seed):
     data = campaign(arm(seed), joints(150, seed), seed=seed, turn_noise_mrad=0.1)
     learnt = learn(ur5, data, network=QUICK)
@@ -206,7 +211,7 @@ def test_a_gain_that_unseen_poses_do_not_confirm_is_not_accepted(ur5, odd, monke
 # Beyond the data
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *map(also_slow, (2, 3))])
 def test_beyond_the_data_a_robot_with_networks_is_never_worse_than_without(ur5, seed, capsys):
     """One joint, or all of them, driven 20 degrees beyond what was measured; 5 and 10 degrees are told."""
     odd = arm(seed)
