@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "workflows" / "benchmark.py"
 QUICK = ("--rounds", "1", "--waypoints", "200", "--sample", "3", "--lines", "500", "--generations", "3")
 GENERATION = {"individuals": 200, "largest": 40, "poses": 1000, "batched_s": 0.01, "torch_s": 0.25, "numpy_s": 0.05}
+GENERATION["dearest"] = {"neurons_of_the_best": 40, "batched_s": 0.02, "torch_s": 0.3}
 
 
 def script(path: Path):

@@ -72,5 +72,8 @@ def test_it_prints_what_it_measured():
     command = [sys.executable, WORKFLOWS / "generation_benchmark.py", "--individuals", "8", "--largest", "5"]
     done = subprocess.run([*command, "--poses", "50", "--rounds", "2"], capture_output=True, text=True, check=True)
     result = json.loads(done.stdout)
-    assert result["neurons_of_the_best"] == 5
-    assert all(result[name] > 0 for name in ("batched_s", "torch_s", "numpy_s"))
+    assert [each["neurons_of_the_best"] for each in result["by_size"]] == [1, 2, 3, 4, 5]
+    assert result["dearest"] == result["by_size"][-1]
+    for name in ("batched_s", "torch_s", "numpy_s"):
+        assert result[name] == pytest.approx(np.mean([each[name] for each in result["by_size"]]))
+        assert result[name] > 0
