@@ -122,7 +122,10 @@ def test_ratios_and_requirements(benchmark, tmp_path, capsys):
     assert rows["program of 500 lines, whole command"]["truepath"] == 3.0
     share = rows["program of 500 lines, share of reading and writing"]
     assert (share["truepath"], share["required"], share["met"]) == (0.4, "<= 0.5", True)
-    by_peer = {row["peer_name"]: row for row in report["rows"]}
+    dearest = rows["a generation of 200 networks, all trials of 40 neurons (the dearest)"]
+    assert dearest["ratio"] == pytest.approx(15.0)
+    assert (dearest["required"], dearest["met"]) == ("", None)
+    by_peer = {row["peer_name"]: row for row in report["rows"] if row is not dearest}
     assert by_peer["one at a time, torch"]["ratio"] == pytest.approx(25.0)
     assert by_peer["one at a time, torch"]["met"] is True
     assert by_peer["one at a time, numpy"]["ratio"] == pytest.approx(5.0)
