@@ -61,16 +61,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def measure(options: argparse.Namespace, neurons: int) -> dict[str, Any]:
     """Seconds per generation, ours and the peers', the best having so many neurons."""
     from truepath.residual.evolution import Settings, State, first_generation, next_generation
-    from truepath.residual.network import one_thread, with_ones
+    from truepath.residual.network import one_thread
+    from truepath.residual.task import Task
 
     rng = np.random.default_rng(0)
     x = rng.uniform(-1, 1, (options.poses, INPUTS))
     target = np.column_stack([np.sin(2 * x[:, 0]), x[:, 1] * x[:, 2], np.cos(x[:, 3] + x[:, 4])])
     # No steps of the hidden sizes: the peers have none.
     settings = Settings(options.individuals, 1, options.largest, sizes_every=1 << 30)
-    x1 = with_ones(torch.tensor(x, dtype=torch.float32, device=options.device))
-    wanted = torch.tensor(target.T.copy(), dtype=torch.float32, device=options.device)
-    first = _with_a_best_of(neurons, first_generation(x1, wanted, settings, seed=0))
+    task = Task.of(x, target, options.device)
+    first = _with_a_best_of(neurons, first_generation(task, settings, seed=0))
 
     class Ours:
         state: State = first
@@ -79,7 +79,7 @@ def measure(options: argparse.Namespace, neurons: int) -> dict[str, Any]:
 
         def generation(self) -> None:
             with one_thread():  # for torch, as a run has it; the threads are those of the evaluation
-                self.state = next_generation(self.state, x1, wanted, settings, seed=0, threads=self.threads)
+                self.state = next_generation(self.state, task, settings, seed=0, threads=self.threads)
             if options.device != "cpu":
                 torch.cuda.synchronize()
 

@@ -53,6 +53,26 @@ def test_where_no_folder_can_be_written_it_is_compiled_all_the_same(monkeypatch)
     assert compiled.compiled(lambda number: number + 1)(41) == 42
 
 
+GENERATION = """
+import numpy as np
+from truepath.residual import compiled
+from truepath.residual.evolution import evolve
+from truepath.residual.limits import Settings
+
+x = np.zeros((5, 6))
+evolve(x, x[:, :3], Settings(3, 1, 2, generations=1), seed=0)
+kernels = compiled.make_trials, compiled.misses(6, 3, np.float32), compiled.select
+print(sum(sum(kernel.stats.cache_misses.values()) for kernel in kernels))
+"""
+
+
+def test_what_one_process_has_compiled_the_next_one_finds():
+    """A kernel that refers to another one made at run time would be compiled anew, 4 s, and kept, each time."""
+    command = [sys.executable, "-c", GENERATION]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    assert subprocess.run(command, check=True, capture_output=True, text=True).stdout.split() == ["0"]
+
+
 def test_numba_is_loaded_when_networks_are_evaluated_and_no_sooner():
     code = "import sys, truepath.residual.evaluation; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-LANES = 16  # numbers in single precision in the widest vector register
+LANES = 16  # numbers in single precision in the widest vector register, and in a line of the cache
 
 # tanh(w) is about SCALE w P(w^2) / Q(w^2) for |w| <= LIMIT; P and Q from their constants up, the highest is 1.
 LIMIT = np.float32(7.0)
@@ -63,6 +63,14 @@ def _sum_of_squares(values, start, stop):  # type: ignore[no-untyped-def]
     return total
 
 
+@compiled
+def aligned(length, precision):  # type: ignore[no-untyped-def]
+    """An array without content that begins where a line of the cache does: a register's load touches only one."""
+    room = np.empty(length + LANES, precision)
+    start = -(room.ctypes.data // room.itemsize) % LANES
+    return room[start : start + length]
+
+
 @cache
 def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
     """The kernel ``(genes, bias, sizes, x, target, poses, found, start, stop)`` for networks of d inputs.
@@ -75,14 +83,14 @@ def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
             divisible by LANES, and small enough for the fastest cache.
         poses: how many there are; the last block may have more room.
         found: ``(P,)``.
-        miss: ``(k S,)`` to work in. Like ``x`` and ``target`` it should begin where a line of the cache does.
     """
     half, width = precision(0.5), inputs + 1 + outputs
     middle, single = inputs // 2, precision is np.float32
     scale = precision(0.5 * SCALE if single else 0.5)
 
-    def kernel(genes, bias, sizes, x, target, poses, found, start, stop, miss):  # type: ignore[no-untyped-def]
-        block = np.uint64(len(miss) // outputs)
+    def kernel(genes, bias, sizes, x, target, poses, found, start, stop):  # type: ignore[no-untyped-def]
+        block = np.uint64(target.shape[1] // outputs)
+        miss = aligned(target.shape[1], precision)
         constants = np.empty(outputs, precision)
         scaled = np.empty((genes.shape[1] + 1, width), precision)
         for who in range(start, stop):
@@ -98,9 +106,10 @@ def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
             total = 0.0
             for part in range(len(x)):
                 given, wanted = x[part], target[part]
-                for k in range(outputs):
-                    for n in range(block):
-                        miss[k * block + n] = constants[k] - wanted[k * block + n]
+                for k in range(outputs):  # unsigned limits, here and below: else each index is looked at
+                    constant, room = constants[k], np.uint64(k) * block
+                    for n in range(room, room + block):
+                        miss[n] = constant - wanted[n]
                 for neuron in range(0, neurons, 2):  # two at a time: the poses are loaded once for both
                     # As tuples, not arrays: else the compiler does not know that nothing in the loop changes them.
                     first = to_fixed_tuple(scaled[neuron], width)
@@ -122,8 +131,9 @@ def misses(inputs: int, outputs: int, precision: Any) -> Kernel:
                         for k in range(outputs):
                             so_far = miss[k * block + n] + first[inputs + 1 + k] * one
                             miss[k * block + n] = so_far + second[inputs + 1 + k] * other
+                filled = min(block, np.uint64(poses) - np.uint64(part) * block)
                 for k in range(outputs):
-                    total += _sum_of_squares(miss, k * block, k * block + min(block, np.uint64(poses) - part * block))
+                    total += _sum_of_squares(miss, np.uint64(k) * block, np.uint64(k) * block + filled)
             found[who] = total
 
     return compiled(kernel, fastmath=FAST)
@@ -155,35 +165,41 @@ def _cross(own, length, best, one, other, factor, crossover, seed, number, trial
         trial[n] = own[n] if kept else best[n] + factor * (one[n] - other[n])
 
 
-@cache
-def trials() -> Kernel:
-    """The kernel that makes trials, eq. 19 and 20; ``evolution.trials`` says what they are.
+@compiled
+def make_trials(  # type: ignore[no-untyped-def]
+    genes, bias, sizes, best, factor, crossover, seeds, trial, trial_bias, start, stop
+):
+    """Trials by eq. 19 and 20 for the individuals from ``start`` to ``stop``; ``succession`` says what they are.
 
-    It writes them into ``trial[start:stop]`` and ``trial_bias[start:stop]``, in the best one's size.
-
-    Args of the kernel:
-        genes, bias, sizes: ``(P, L (d + 1 + k))``, ``(P, k)``, ``(P,)``: all neurons of an individual in one row.
-        width: ``d + 1 + k``.
+    Args:
+        genes, bias, sizes: ``(P, L, d + 1 + k)``, ``(P, k)``, ``(P,)`` as a population has them.
         best, factor, crossover: who is the best; settings of the evolution, in the precision of the genes.
         seeds: ``(P,)`` unsigned, for each individual's chance: the result does not depend on the order of work.
         trial, trial_bias: like ``genes`` and ``bias``; beyond the size of the best nothing is written.
     """
+    count, outputs = bias.shape
+    width = genes.shape[2]
+    flat, trial_flat = genes.reshape(count, -1), trial.reshape(count, -1)
+    length = sizes[best] * width
+    one, other = np.empty(length, genes.dtype), np.empty(length, genes.dtype)
+    for who in range(start, stop):
+        seed = seeds[who]
+        a = int(_chance(seed, 0) * count)
+        b = (a + 1 + int(_chance(seed, 1) * (count - 1))) % count
+        _unify(flat[a], sizes[a] * width, seed, 2, one)
+        _unify(flat[b], sizes[b] * width, seed, 2 + length, other)
+        has, number = sizes[who] * width, 2 + 2 * length
+        _cross(flat[who], has, flat[best], one, other, factor, crossover, seed, number, trial_flat[who])
+        number += length
+        _cross(bias[who], outputs, bias[best], bias[a], bias[b], factor, crossover, seed, number, trial_bias[who])
 
-    def kernel(  # type: ignore[no-untyped-def]
-        genes, bias, sizes, width, best, factor, crossover, seeds, trial, trial_bias, start, stop
-    ):
-        count, outputs = bias.shape
-        length = sizes[best] * width
-        one, other = np.empty(length, genes.dtype), np.empty(length, genes.dtype)
-        for who in range(start, stop):
-            seed = seeds[who]
-            a = int(_chance(seed, 0) * count)
-            b = (a + 1 + int(_chance(seed, 1) * (count - 1))) % count
-            _unify(genes[a], sizes[a] * width, seed, 2, one)
-            _unify(genes[b], sizes[b] * width, seed, 2 + length, other)
-            has, number = sizes[who] * width, 2 + 2 * length
-            _cross(genes[who], has, genes[best], one, other, factor, crossover, seed, number, trial[who])
-            number += length
-            _cross(bias[who], outputs, bias[best], bias[a], bias[b], factor, crossover, seed, number, trial_bias[who])
 
-    return compiled(kernel)
+@compiled
+def select(genes, bias, sizes, error, trial, trial_bias, trial_sizes, trial_error, start, stop):  # type: ignore[no-untyped-def]
+    """Individuals from ``start`` to ``stop`` take the places of trials that are not better (eq. 21)."""
+    for who in range(start, stop):
+        if trial_error[who] < error[who]:
+            trial[who, trial_sizes[who] :] = 0.0
+        else:  # also if the trial's error is no number
+            trial[who], trial_bias[who] = genes[who], bias[who]
+            trial_sizes[who], trial_error[who] = sizes[who], error[who]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
 
@@ -15,20 +15,33 @@ from truepath.lie import Array
 
 AT_ONCE = 25  # networks: enough for a thread to do, few enough for the last one to be done soon after the others
 MOST_POSES = 1024  # in a block: what they need stays near the processor
-LINE_BYTES = 64  # of the cache: a vector register that lies across two of them takes twice as long to load
 
 Item = TypeVar("Item")
 
 
-def squared_misses(
-    genes: Array,
-    bias: Array,
-    sizes: Array,
-    x1: Array,
-    target: Array,
-    threads: int = 1,
-    make: Callable[[int, int], None] | None = None,
-) -> Array:
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Samples as the kernels take them: a row per block of poses, so many that what they need stays near the processor.
+
+    Attributes:
+        x, target: ``(B, d S)``, ``(B, k S)``; zeros fill the last block.
+        poses: how many there are.
+        inputs, outputs: d and k.
+    """
+
+    x: Array
+    target: Array
+    poses: int
+    inputs: int
+    outputs: int
+
+    @classmethod
+    def of(cls, x1: Array, target: Array) -> Blocks:
+        """From ``(d + 1, N)`` inputs as ``network.with_ones`` makes them, and ``(k, N)`` targets."""
+        return cls(_in_blocks(x1[:-1]), _in_blocks(target), target.shape[1], len(x1) - 1, len(target))
+
+
+def squared_misses(genes: Array, bias: Array, sizes: Array, x1: Array, target: Array, threads: int = 1) -> Array:
     """``(P,)`` squared misses of P networks, summed over samples and outputs, in the precision of the arguments.
 
     Args:
@@ -36,34 +49,29 @@ def squared_misses(
         x1: ``(d + 1, N)`` inputs as ``network.with_ones`` makes them.
         target: ``(k, N)``.
         threads: at most so many; the result does not depend on their number.
-        make: writes the genes and biases of the networks from the first number up to the second one into the arrays,
-            just before they are needed; None if they are there. Then the arrays must be contiguous.
     """
     from truepath.residual import compiled
 
-    found = np.empty(len(sizes), target.dtype)
+    found, blocks = np.empty(len(sizes), target.dtype), Blocks.of(x1, target)
     precision: Any = target.dtype.type
-    x, wanted = (_in_blocks(values, compiled.LANES) for values in (x1[:-1], target))
-    kernel = compiled.misses(len(x1) - 1, len(target), precision)
+    kernel = compiled.misses(blocks.inputs, blocks.outputs, precision)
     genes, bias = np.ascontiguousarray(genes), np.ascontiguousarray(bias)
 
-    def evaluate(start: int) -> None:
-        stop = min(start + AT_ONCE, len(sizes))
-        if make is not None:
-            make(start, stop)
-        miss = _aligned((wanted.shape[1],), target.dtype)
-        kernel(genes, bias, sizes, x, wanted, target.shape[1], found, start, stop, miss)
+    def evaluate(start: int, stop: int) -> None:
+        kernel(genes, bias, sizes, blocks.x, blocks.target, blocks.poses, found, start, stop)
 
-    share_out(evaluate, range(0, len(sizes), AT_ONCE), threads)
+    a_few_at_a_time(evaluate, len(sizes), threads)
     return found
 
 
-def _in_blocks(values: Array, lanes: int) -> Array:
-    """``(B, q S)``: rows of ``(q, N)`` cut into pieces of equal size, a multiple of ``lanes``; zeros fill the last."""
+def _in_blocks(values: Array) -> Array:
+    """``(B, q S)``: rows of ``(q, N)`` cut into pieces of equal size, a multiple of a register's; zeros at the end."""
+    from truepath.residual import compiled
+
     rows, count = values.shape
     blocks = -(-count // MOST_POSES)
-    size = lanes * -(-count // (lanes * blocks))
-    filled = _aligned((blocks, rows, size), values.dtype)
+    size = compiled.LANES * -(-count // (compiled.LANES * blocks))
+    filled = compiled.aligned(blocks * rows * size, values.dtype).reshape(blocks, rows, size)
     filled[-1] = 0.0
     for block, start in enumerate(range(0, count, size)):
         part = values[:, start : start + size]
@@ -71,12 +79,9 @@ def _in_blocks(values: Array, lanes: int) -> Array:
     return filled.reshape(blocks, -1)
 
 
-def _aligned(shape: tuple[int, ...], dtype: Any) -> Array:
-    """An array without content that begins where a line of the cache does."""
-    size = math.prod(shape) * np.dtype(dtype).itemsize
-    room = np.empty(size + LINE_BYTES, np.uint8)
-    start = -room.ctypes.data % LINE_BYTES
-    return room[start : start + size].view(dtype).reshape(shape)
+def a_few_at_a_time(work: Callable[[int, int], None], count: int, threads: int) -> None:
+    """Calls ``work`` with a first number and the one after the last, until all networks had their turn."""
+    share_out(lambda start: work(start, min(start + AT_ONCE, count)), range(0, count, AT_ONCE), threads)
 
 
 def share_out(work: Callable[[Item], None], items: Sequence[Item], threads: int) -> None:

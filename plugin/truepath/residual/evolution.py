@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
-import numpy as np
 import torch
 
 from truepath.lie import Array
 from truepath.residual.limits import Settings
-from truepath.residual.network import Network, Tensor, with_ones
-from truepath.residual.population import Make, Population, generator_for, uniform
+from truepath.residual.network import Network, Tensor
+from truepath.residual.population import Population, generator_for, uniform
+from truepath.residual.succession import successors
+from truepath.residual.task import Task
 
 WORTH_MENTIONING = 1e-3  # of the error
 
@@ -73,12 +73,10 @@ def evolve(
         start: where an earlier run was interrupted.
         observe: told about each generation.
     """
-    where = torch.device(device)
-    x1 = with_ones(torch.tensor(x, dtype=torch.float32, device=where))
-    wanted = torch.tensor(np.ascontiguousarray(target.T), dtype=torch.float32, device=where)
-    state = first_generation(x1, wanted, settings, seed, threads) if start is None else start
+    task = Task.of(x, target, device)
+    state = first_generation(task, settings, seed, threads) if start is None else start
     while not has_ended(state, settings):
-        state = next_generation(state, x1, wanted, settings, seed, threads)
+        state = next_generation(state, task, settings, seed, threads)
         observe(state)
     return state
 
@@ -92,8 +90,9 @@ def has_ended(state: State, settings: Settings) -> bool:
     )
 
 
-def first_generation(x1: Tensor, target: Tensor, settings: Settings, seed: int, threads: int = 1) -> State:
+def first_generation(task: Task, settings: Settings, seed: int, threads: int = 1) -> State:
     """Random networks of all hidden sizes."""
+    x1, target = task.x1, task.target
     generator = generator_for(seed, 0, x1.device)
     sizes = torch.randint(
         settings.smallest, settings.largest + 1, (settings.individuals,), generator=generator, device=x1.device
@@ -103,95 +102,17 @@ def first_generation(x1: Tensor, target: Tensor, settings: Settings, seed: int, 
     return State(population, error, generation=0, stale=0, reference=float(error.min()))
 
 
-def next_generation(state: State, x1: Tensor, target: Tensor, settings: Settings, seed: int, threads: int = 1) -> State:
+def next_generation(state: State, task: Task, settings: Settings, seed: int, threads: int = 1) -> State:
     """Mutation, crossover, greedy selection; from time to time the hidden sizes step."""
     generation = state.generation + 1
-    generator = generator_for(seed, generation, x1.device)
-    trial, make = _trials_and_maker(state.population, state.best, settings, generator)
-    error = trial.mean_squared_error(x1, target, threads, make)
-    better = error < state.error  # eq. 21
-    population, error = state.population.where(better, trial), torch.where(better, error, state.error)
+    generator = generator_for(seed, generation, task.x1.device)
+    population, error = successors(state.population, state.error, task, settings, generator, threads)
     best = float(error.min())
     if best > settings.target and generation % settings.sizes_every == 0:
         population, changed = stepped(population, int(torch.argmin(error)), settings, generator)
-        error = torch.where(changed, population.mean_squared_error(x1, target, threads), error)
+        error = torch.where(changed, population.mean_squared_error(task.x1, task.target, threads), error)
     fell = best < (1.0 - WORTH_MENTIONING) * state.reference
     return State(population, error, generation, 0 if fell else state.stale + 1, best if fell else state.reference)
-
-
-def trials(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
-    """A trial for each individual: the best one with a difference of two others, crossed with the individual itself.
-
-    Mutation (eq. 19) takes the hidden size of the best: what two others have beyond it is disregarded, what they lack
-    is drawn at random. Crossover (eq. 20) takes single numbers of the individual where it has them.
-    """
-    on_cpu = population.sizes.device.type == "cpu"
-    return (_trials_on_cpu if on_cpu else _trials_on_gpu)(population, best, settings, generator)
-
-
-def _trials_and_maker(
-    population: Population, best: int, settings: Settings, generator: torch.Generator
-) -> tuple[Population, Make | None]:
-    """On a CPU whoever evaluates a trial makes it, so that all threads have their share and it is still at hand."""
-    if population.sizes.device.type == "cpu":
-        return _to_be_made(population, best, settings, generator)
-    return _trials_on_gpu(population, best, settings, generator), None
-
-
-def _trials_on_cpu(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
-    trial, make = _to_be_made(population, best, settings, generator)
-    make(0, len(trial))
-    return trial
-
-
-def _to_be_made(
-    population: Population, best: int, settings: Settings, generator: torch.Generator
-) -> tuple[Population, Make]:
-    from truepath.residual import compiled
-
-    limits = torch.iinfo(torch.int64)
-    seeds = torch.randint(limits.min, limits.max, (len(population),), generator=generator).numpy().view(np.uint64)
-    genes, bias, sizes = (part.numpy() for part in (population.genes, population.bias, population.sizes))
-    flat, precision = genes.reshape(len(genes), -1), genes.dtype.type
-    trial, trial_bias = np.zeros_like(flat), np.empty_like(bias)
-    factor, crossover = precision(settings.factor), settings.crossover
-    arguments = flat, bias, sizes, genes.shape[2], best, factor, crossover, seeds, trial, trial_bias
-    made = Population(
-        torch.from_numpy(trial.reshape(genes.shape)),
-        torch.from_numpy(trial_bias),
-        torch.full_like(population.sizes, int(sizes[best])),
-    )
-    return made, partial(compiled.trials(), *arguments)
-
-
-def _trials_on_gpu(population: Population, best: int, settings: Settings, generator: torch.Generator) -> Population:
-    count, room = len(population), population.room
-    size, device = int(population.sizes[best]), population.sizes.device
-    a = torch.randint(count, (count,), generator=generator, device=device)
-    b = (a + torch.randint(1, count, (count,), generator=generator, device=device)) % count
-    genes, bias, lacks = population.genes[:, :size], population.bias, ~population.has()[:, :size]
-    difference = _unified(genes, lacks, a, generator).sub_(_unified(genes, lacks, b, generator))
-    mutant = torch.add(genes[best], difference, alpha=settings.factor)
-    mutant_bias = torch.add(bias[best], bias[a] - bias[b], alpha=settings.factor)
-    keep, keep_bias = (
-        torch.rand(own.shape, generator=generator, device=device) > settings.crossover for own in (genes, bias)
-    )
-    if lacks.any():
-        keep[lacks] = False
-    return Population(
-        torch.nn.functional.pad(torch.where(keep, genes, mutant), (0, 0, 0, room - size)),
-        torch.where(keep_bias, bias, mutant_bias),
-        torch.full_like(population.sizes, size),
-    )
-
-
-def _unified(genes: Tensor, lacks: Tensor, who: Tensor, generator: torch.Generator) -> Tensor:
-    """The genes of some individuals in the length of the best: random where an individual has none."""
-    unified, missing = genes.index_select(0, who), lacks.index_select(0, who)
-    count = int(missing.sum())
-    if count:
-        unified[missing] = uniform((count, genes.shape[2]), generator, genes.device, genes.dtype)
-    return unified
 
 
 def stepped(

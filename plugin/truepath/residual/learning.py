@@ -45,7 +45,9 @@ class Lesson:
     seed: int
 
 
-def learn_network(lesson: Lesson, options: Options, report: Callable[[State], None] = lambda _: None) -> Network:
+def learn_network(
+    lesson: Lesson, options: Options, report: Callable[[State], None] = lambda _: None, threads: int = 1
+) -> Network:
     """A network by evolution and gradient training; from a checkpoint, where there is one that has it."""
     seen = ~lesson.validation
     desk = options.checkpoint
@@ -65,6 +67,7 @@ def learn_network(lesson: Lesson, options: Options, report: Callable[[State], No
             options.evolution,
             lesson.seed,
             device=options.device,
+            threads=threads,
             start=None if desk is None else desk.state(key, lesson, options),
             observe=observe,
         )
@@ -91,11 +94,13 @@ def learn_networks(
                 raise CancelledError
             progress(f"{title}: network {finished + 1} of {len(lessons)}, generation {state.generation}")
 
-        network = learn_network(lesson, options, report)
+        network = learn_network(lesson, options, report, threads)
         finished += 1
         return network
 
-    workers = 1 if options.device != "cpu" else min(len(lessons), os.cpu_count() or 1)
+    cores = 1 if options.device != "cpu" else os.cpu_count() or 1
+    workers = min(len(lessons), cores)
+    threads = cores // max(workers, 1)
     with ThreadPoolExecutor(workers) as pool:
         futures = [pool.submit(one, lesson) for lesson in lessons]
         try:

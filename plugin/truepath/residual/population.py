@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from truepath.residual.network import Network, Tensor, activations, stacked
 GPU_BYTES = 1 << 30  # activations of so many networks at a time
 
 Rows = slice | Tensor
-Make = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,17 +86,16 @@ class Population:
         pairs = (self.genes, other.genes), (self.bias, other.bias), (self.sizes, other.sizes)
         return Population(*(own.index_copy(0, rows, theirs.index_select(0, rows)) for own, theirs in pairs))
 
-    def mean_squared_error(self, x1: Tensor, target: Tensor, threads: int = 1, make: Make | None = None) -> Tensor:
+    def mean_squared_error(self, x1: Tensor, target: Tensor, threads: int = 1) -> Tensor:
         """``(P,)`` squared miss per sample, averaged over the samples (eq. 15).
 
         Args:
             x1: ``(d + 1, N)`` inputs as ``network.with_ones`` makes them.
             target: ``(k, N)``.
             threads: at most so many, on a CPU; the result does not depend on their number.
-            make: on a CPU, fills in these networks, a few at a time; see ``evaluation.squared_misses``.
         """
         if target.device.type == "cpu":
-            return self._squares_on_cpu(x1, target, threads, make) / target.shape[1]
+            return self._squares_on_cpu(x1, target, threads) / target.shape[1]
         return self._squares_on_gpu(x1, target) / target.shape[1]
 
     def _squares_on_gpu(self, x1: Tensor, target: Tensor) -> Tensor:
@@ -108,9 +106,9 @@ class Population:
             squares[rows] = torch.linalg.vector_norm(miss.flatten(1), dim=1).square_()
         return squares
 
-    def _squares_on_cpu(self, x1: Tensor, target: Tensor, threads: int, make: Make | None) -> Tensor:
+    def _squares_on_cpu(self, x1: Tensor, target: Tensor, threads: int) -> Tensor:
         genes, bias, sizes, given, wanted = (t.numpy() for t in (self.genes, self.bias, self.sizes, x1, target))
-        return torch.from_numpy(evaluation.squared_misses(genes, bias, sizes, given, wanted, threads, make))
+        return torch.from_numpy(evaluation.squared_misses(genes, bias, sizes, given, wanted, threads))
 
     def _groups(self, fast: int, target: Tensor) -> Iterator[tuple[Rows, int]]:
         """Networks of like size, and the largest such: as many as leave their activations in so many fast bytes."""
