@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from truepath.context import Context
 from truepath.effect_fit import EffectFit, kinematic_prior, linearise
@@ -69,7 +69,7 @@ class CrossValidation:
             for name in groups:
                 # What is left is noise of size 1 if the cause is not real.
                 z = agreement[name] / np.sqrt(spread[name]) if spread[name] > 0 else 0.0
-                worst[name] = max(worst[name], float(stats.norm.sf(z)))
+                worst[name] = max(worst[name], float(special.ndtr(-z)))
         return worst
 
     def _left_out(self, rows: Array, groups: Mapping[str, Array], H: Array, g: Array) -> dict[str, tuple[Array, Array]]:

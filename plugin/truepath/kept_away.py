@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from truepath.context import Context
 from truepath.diagnosis import Gain
@@ -48,7 +48,7 @@ class KeptAway:
         before, after = self.errors_mm(without), self.errors_mm(model)
         difference = before - after
         mean, k = float(difference.mean()), len(difference)
-        half = float(stats.t.ppf(0.975, k - 1) * difference.std(ddof=1) / np.sqrt(k)) if k > 1 else np.inf
+        half = float(special.stdtrit(k - 1, 0.975) * difference.std(ddof=1) / np.sqrt(k)) if k > 1 else np.inf
         return Gain(float(before.mean()), float(after.mean()), (mean - half, mean + half))
 
     def _accuracy(self, X_ME: Array) -> Accuracy:

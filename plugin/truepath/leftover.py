@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from scipy import stats
+from scipy import special
 from scipy.spatial import cKDTree
 
 from truepath.lie import Array
@@ -75,7 +75,7 @@ def more_than_repeats(measurements: Measurements, residual: Array) -> float:
     mean = np.stack([np.bincount(groups, residual[:, axis]) / count for axis in range(3)], axis=1)
     noise = float(np.sum((residual[:, :3] - mean[groups]) ** 2)) / (3 * within)
     between = float(np.sum(count[:, None] * mean**2)) / (3 * len(count))
-    return float(stats.f.sf(between / noise, 3 * len(count), 3 * within))
+    return float(special.fdtrc(3 * len(count), 3 * within, between / noise))
 
 
 def _pairs(space: Array) -> Array:
@@ -88,7 +88,7 @@ def _pairs(space: Array) -> Array:
 def _correlated(whitened: Array, pairs: Array) -> float:
     products = np.sum(whitened[pairs[:, 0]] * whitened[pairs[:, 1]], axis=1)
     variance = np.mean(whitened**2, axis=0)
-    return float(stats.norm.sf(products.sum() / np.sqrt(len(pairs) * np.sum(variance**2))))
+    return float(special.ndtr(-products.sum() / np.sqrt(len(pairs) * np.sum(variance**2))))
 
 
 def spread(q_rad: Array) -> Array:

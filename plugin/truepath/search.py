@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from truepath.context import Context
 from truepath.effect_fit import EffectFit, kinematic_prior, linearise
@@ -173,7 +173,7 @@ class Search:
                 promising = self._pursued(terms, columns)
             else:
                 chi2, dof = self.scores(terms, columns)
-                promising = stats.chi2.sf(chi2, dof) < leniency * WORTH_A_LOOK
+                promising = special.chdtrc(dof, chi2) < leniency * WORTH_A_LOOK
             terms, columns = terms.only(promising[terms.group]), columns[:, :, promising[terms.group]]
         problem, size = self.marginal.problem(columns), None
         while len(terms):

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from truepath.kept_away import KeptAway
 from truepath.lie import Array
@@ -54,6 +53,8 @@ def compare(without: Samples, with_it: Samples) -> Proof:
     before, after = (_by_visit(samples.position_mm, samples.visits) for samples in (without, with_it))
     p_value, turns_away = 1.0, not with_it.orientation_mrad.mean() <= TOLERATED * without.orientation_mrad.mean()
     if np.ptp(before - after) > 0 and not turns_away:
+        from scipy import stats  # takes a quarter of a second, and few commands come here
+
         p_value = float(stats.ttest_1samp(before - after, 0.0, alternative="greater").pvalue)
     return Proof(p_value, float(before.mean()), float(after.mean()), turns_away)
 
