@@ -1,48 +1,20 @@
-"""Calibration of virtual robots. The truth is Drake's; see truepath.virtual.truth and drake_arm."""
+"""Calibration of virtual robots finds the truth, which is Drake's: see ``truepath.virtual.truth``."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from drake_arm import DrakeArm, random_joints
+from coverage_workflow import study
 from scipy.spatial.transform import Rotation
-from truepath import plants
 from truepath.calibrate import calibrate
-from truepath.errors import CalibrationError
 from truepath.virtual.real_robot import RealRobot
 from truepath.virtual.simulate import Campaign, free_poses, measure
 from truepath.virtual.truth import true_deviations
 
-ROOT = Path(__file__).parents[1]
 POSES, NOISE_M, ORIENTATION_NOISE_RAD = 300, 2e-5, 5e-5
 WITH_ORIENTATION = Campaign(orientation_noise_mrad=0.05)
 REDUNDANT_BASE = {*(f"axis1.{field}" for field in ("pos_x", "pos_y", "rot_x", "rot_y")), "axis2.pos_y", "axis2.rot_y"}
 PROBE_ORIENTATION = {"tool.rot_x", "tool.rot_y", "tool.rot_z"}
-
-# Six joints, a spherical wrist, and two parallel axes only: not a UR.
-ELBOW_ARM_JOINTS = (  # axis, origin on the link before
-    ("0 0 1", "0 0 0.40"),
-    ("0 1 0", "0.18 0 0.10"),
-    ("0 1 0", "0 0 0.60"),
-    ("1 0 0", "0.10 0 0.12"),
-    ("0 1 0", "0.52 0 0"),
-    ("1 0 0", "0.08 0 0"),
-)
-
-
-def load_study():
-    """The workflow, which lies in no package."""
-    spec = importlib.util.spec_from_file_location("coverage_study", ROOT / "workflows" / "coverage_study.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
-study = load_study()
 
 
 @pytest.fixture(scope="module")
@@ -203,13 +175,6 @@ def test_stated_frames_are_kept_for_the_nominal_robot_and_do_not_change_the_fit(
     assert np.allclose(other.model.p, fit.model.p, atol=1e-10)
 
 
-def test_a_perfect_robot_is_found_to_be_perfect(ur5):
-    arm = DrakeArm("ur5")
-    fit = calibrate(ur5, arm.measure(random_joints(ur5, POSES, 3), [-0.07, 0.0, 0.031], 0.02, seed=3))
-    free = (fit.sigma > 0) & (np.arange(len(fit.sigma)) < 24)
-    assert (np.abs(fit.model.p[free]) < 4 * fit.sigma[free]).all()
-
-
 # What the data cannot see
 
 
@@ -225,71 +190,6 @@ def test_held_parameters_stay_at_nominal_without_a_standard_deviation(fit):
     assert not fit.covariance[held].any()
     assert not fit.covariance[:, held].any()
     assert (np.delete(fit.sigma, held) > 0).all()
-
-
-def test_a_reflector_on_the_axis_of_joint_6_leaves_its_tilt_barely_seen_and_predicts_as_well(ur5):
-    arm, p_FE = DrakeArm("ur5", seed=5), [0.0, 0.0, 0.031]
-    q = random_joints(ur5, POSES, 5)
-    fit = calibrate(ur5, arm.measure(q, p_FE, 0.02, seed=5))
-    assert {str(fit.names[i]) for i in fit.barely_seen} == {"axis6.rot_x", "axis6.rot_y"}
-    assert fit.sigma_position_m == pytest.approx(NOISE_M, rel=0.1)
-    fresh = arm.measure(random_joints(ur5, 100, 6), p_FE, 0.0, seed=0)
-    assert np.linalg.norm(fit.model.predict(fresh.q_rad)[:, :3, 3] - fresh.p_ME, axis=1).max() < NOISE_M
-
-
-def test_a_joint_that_never_moved_has_its_axis_held(ur5):
-    arm, p_FE = DrakeArm("ur5", seed=6), [-0.07, 0.0, 0.031]
-    q, fresh = random_joints(ur5, POSES, 6), random_joints(ur5, 100, 7)
-    q[:, 5] = fresh[:, 5] = 0.4
-    fit = calibrate(ur5, arm.measure(q, p_FE, 0.02, seed=6))
-    held = held_names(fit)
-    assert all(any(name == f"axis6.{field}" for name in held) for field in ("pos_x", "pos_y", "rot_x", "rot_y")), held
-    truth = arm.measure(fresh, p_FE, 0.0, seed=0).p_ME
-    assert np.linalg.norm(fit.model.predict(fresh)[:, :3, 3] - truth, axis=1).max() < 1.5 * NOISE_M
-
-
-# Other arms
-
-
-def fits_to_the_noise(spec, seed):
-    """Calibrates a perturbed arm; asserts that fresh poses are met."""
-    robot, arm, p_FE = plants.load_robot(spec), DrakeArm(spec, seed), [-0.07, 0.02, 0.05]
-    fit = calibrate(robot, arm.measure(random_joints(robot, 400, seed), p_FE, 0.02, seed))
-    fresh = arm.measure(random_joints(robot, 100, seed + 1), p_FE, 0.0, seed)
-    nominal = np.linalg.norm(fit.model.predict_nominal(fresh.q_rad)[:, :3, 3] - fresh.p_ME, axis=1)
-    error = np.linalg.norm(fit.model.predict(fresh.q_rad)[:, :3, 3] - fresh.p_ME, axis=1)
-    assert nominal.mean() > 2e-4
-    assert error.max() < 1.5 * NOISE_M
-    assert fit.sigma_position_m == pytest.approx(NOISE_M, rel=0.08)
-    return fit
-
-
-@pytest.mark.parametrize("seed", [1, 3])
-def test_an_arm_of_seven_joints_is_calibrated_to_the_noise_with_deviations_of_the_size_of_the_errors(
-    seven_joint_arm, seed
-):
-    fit = fits_to_the_noise(seven_joint_arm, seed)
-    assert len(fit.names) == 4 * 7 + 12
-    assert len(held_names(fit)) == 6 + 3
-    assert np.abs(fit.model.p).max() < 0.005
-
-
-def test_an_arm_with_a_spherical_wrist_is_calibrated_to_the_noise(tmp_path):
-    parts = []
-    for number, (axis, xyz) in enumerate(ELBOW_ARM_JOINTS, start=1):
-        carrier = f"link{number - 1}" if number > 1 else "base"
-        parts.append(
-            f'<link name="link{number}"/><joint name="j{number}" type="revolute"><parent link="{carrier}"/>'
-            f'<child link="link{number}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>'
-            '<limit lower="-2.8" upper="2.8" velocity="2" effort="100"/></joint>'
-        )
-    flange = (
-        '<link name="flange"/><joint name="mount" type="fixed"><parent link="link6"/><child link="flange"/>'
-        '<origin xyz="0.1 0 0" rpy="0 1.5707963 0"/></joint>'
-    )
-    urdf = tmp_path / "elbow.urdf"
-    urdf.write_text(f'<robot name="elbow"><link name="base"/>{"".join(parts)}{flange}</robot>')
-    fits_to_the_noise(urdf, 2)
 
 
 # Gross errors
@@ -326,109 +226,3 @@ def test_errors_that_all_point_the_same_way_do_not_draw_the_fit_along(real, data
 def test_clean_data_lose_no_pose(fit, fit_6d):
     assert not fit.outlier.any()
     assert not fit_6d.outlier.any()
-
-
-# Refusals
-
-
-def refusal(robot, data):
-    with pytest.raises(CalibrationError) as caught:
-        calibrate(robot, data)
-    return str(caught.value)
-
-
-def test_too_few_poses_are_refused_with_the_number_needed(real, data, joints):
-    text = refusal(real.robot, data.subset(np.arange(9)))
-    assert "too few poses for 27 parameters" in text
-    assert "at least 12 different poses" in text
-    assert "found:    9" in text
-    calibrate(real.robot, data.subset(np.arange(12)))
-    text = refusal(real.robot, measure(real, joints[:7], WITH_ORIENTATION))
-    assert "at least 8 different poses with 6 readings each" in text
-
-
-def test_repeated_visits_count_as_one_pose(real, joints):
-    text = refusal(real.robot, measure(real, joints[:9], Campaign(repeats=10)))
-    assert "too few poses" in text
-    assert "found:    9" in text
-
-
-def test_poses_that_are_all_alike_are_refused(real, joints):
-    text = refusal(real.robot, measure(real, np.tile(joints[:1], (40, 1)), Campaign()))
-    assert "all poses are alike" in text
-    assert "joints that move" in text
-
-
-def test_repeated_visits_count_as_one_pose_without_their_pose_id_too(real, joints):
-    text = refusal(real.robot, measure(real, np.tile(joints[:3], (20, 1)), Campaign()))
-    assert "too few poses" in text
-    assert "found:    3" in text
-
-
-@pytest.mark.parametrize("moving", [0, 5], ids=["joint 1", "joint 6"])
-def test_poses_in_which_a_single_joint_moves_are_refused(real, joints, moving):
-    q = np.tile(joints[:1], (40, 1))
-    q[:, moving] = np.linspace(-3, 3, 40)
-    refusal(real.robot, measure(real, q, Campaign()))
-
-
-@pytest.mark.parametrize("campaign", [Campaign(), WITH_ORIENTATION], ids=["3d", "6d"])
-@pytest.mark.parametrize(
-    ("field", "factor"),
-    [("q_rad", 180 / np.pi), ("q_rad", np.pi / 180), ("p_ME", 1e3), ("p_ME", 1e-3)],
-    ids=["degrees as radians", "radians as degrees", "mm as m", "m as mm"],
-)
-def test_mixed_up_units_are_refused_and_suspected(real, joints, campaign, field, factor):
-    data = measure(real, joints[:POSES], campaign)
-    text = refusal(real.robot, replace(data, **{field: factor * getattr(data, field)}))
-    assert "radians and degrees or mm and m mixed up" in text
-
-
-def test_the_data_of_another_robot_are_refused(data, ur10):
-    assert "another robot" in refusal(ur10, data)
-
-
-def test_joints_in_another_order_are_refused(real, data):
-    assert "joints in another order" in refusal(real.robot, replace(data, q_rad=data.q_rad[:, ::-1]))
-
-
-# Statistics over many robots
-
-
-def test_the_95_percent_intervals_hold_the_truth_of_a_few_robots():
-    result = study.run_study(6)
-    assert result.complaints() == []
-    assert 0.90 <= result.coverage <= 0.99
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("orientation_noise_mrad", [None, 0.05])
-def test_the_95_percent_intervals_hold_the_truth_of_fifty_robots(orientation_noise_mrad):
-    result = study.run_study(50, orientation_noise_mrad=orientation_noise_mrad)
-    assert result.complaints() == []
-    assert 0.90 <= result.coverage <= 0.99
-
-
-def test_the_study_prints_a_table_and_exits_with_its_verdict(capsys, monkeypatch):
-    assert study.main(["--seeds", "2", "--poses", "60"]) in (0, 1)
-    assert "coverage" in capsys.readouterr().out
-    monkeypatch.setattr(study, "COVERAGE", (0.999, 1.0))
-    assert study.main(["--seeds", "2", "--poses", "60"]) == 1
-    assert "not as it should be: 95 % intervals hold the truth in" in capsys.readouterr().out
-
-
-def test_quaternions_that_turn_the_other_way_are_refused(real, joints):
-    data = measure(real, joints[:60], Campaign(orientation_noise_mrad=0.05))
-    text = refusal(real.robot, replace(data, R_ME=np.swapaxes(data.R_ME, 1, 2)))
-    assert "qw, qx, qy, qz" in text
-
-
-def test_what_is_barely_seen_widens_the_uncertainty_of_all_that_hangs_on_it(ur5):
-    """With the reflector on axis 6 its place and its tilt cannot be told apart: sigma must say so."""
-    arm = DrakeArm("ur5", seed=8)
-    on_axis, beside = (
-        calibrate(ur5, arm.measure(random_joints(ur5, 200, 8), p_FE, 0.02, seed=8))
-        for p_FE in ([0.0, 0.0, 0.031], [0.07, 0.0, 0.031])
-    )
-    position = [i for i, name in enumerate(on_axis.names) if str(name) in ("axis6.pos_x", "axis6.pos_y")]
-    assert (on_axis.sigma[position] > 20 * beside.sigma[position]).all()

@@ -1,42 +1,16 @@
-"""What is read out of a Drake plant, with Drake itself as the judge."""
-
-from dataclasses import replace
+"""What is read out of a Drake plant, with Drake itself as the judge: kinematics, limits and gravity."""
 
 import numpy as np
 import pytest
+from arm_judge import Judge, load, some_angles
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, SpatialInertia
+from pydrake.multibody.tree import JacobianWrtVariable, SpatialInertia
 from scipy.linalg import expm
-from truepath.errors import InputError
 from truepath.plants import load_plant, make_parser, models_dir
 from truepath.robot import read_robot
 
 ARMS = ("ur5", "ur10", "ur5 cell", "ur10 cell", "seven")
-
-
-class Judge:
-    """One arm in one Drake plant, and the questions that the tests ask of Drake."""
-
-    def __init__(self, plant, instance_name, base, flange):
-        self.plant, self.context = plant, plant.CreateDefaultContext()
-        self.instance = plant.GetModelInstanceByName(instance_name)
-        self.base, self.flange = (plant.GetFrameByName(name, self.instance) for name in (base, flange))
-
-    def joints(self, robot):
-        return [self.plant.GetJointByName(name, self.instance) for name in robot.joint_names]
-
-    def move(self, robot, q):
-        for joint, angle in zip(self.joints(robot), q, strict=True):
-            joint.set_angle(self.context, angle)
-
-    def flange_pose(self):
-        return self.flange.CalcPose(self.context, self.base).GetAsMatrix4()
-
-    def gravity_torque(self, robot):
-        forces = self.plant.CalcGravityGeneralizedForces(self.context)
-        return np.array([forces[joint.velocity_start()] for joint in self.joints(robot)])
 
 
 @pytest.fixture(scope="module")
@@ -58,28 +32,6 @@ def arm(request, spec):
     source, *names = spec(request.param)
     plant = load_plant(source)
     return read_robot(plant), Judge(plant, *names)
-
-
-@pytest.fixture(scope="module")
-def load(tmp_path_factory):
-    """A finalized plant from the text of a URDF, and before that whatever a test wants to add."""
-
-    def load(text, prepare=lambda plant: None):
-        path = tmp_path_factory.mktemp("urdf") / "robot.urdf"
-        path.write_text(text)
-        plant = MultibodyPlant(0.0)
-        Parser(plant).AddModels(str(path))
-        prepare(plant)
-        plant.Finalize()
-        return plant
-
-    return load
-
-
-def some_angles(robot, count=20):
-    rng = np.random.default_rng(5)
-    low, high = np.maximum(robot.lower_rad, -np.pi), np.minimum(robot.upper_rad, np.pi)
-    return rng.uniform(low, high, (count, robot.num_joints))
 
 
 def hat(xi):
@@ -144,7 +96,7 @@ def test_limits_are_those_of_the_urdf(seven):
     np.testing.assert_array_equal(seven.acceleration_rad_s2, [5.1, 5.2, 5.3, 5.4, 5.5, 5.6, 5.7])
 
 
-def test_a_joint_without_limits_has_infinite_ones(load, seven_joint_urdf):
+def test_a_joint_without_limits_has_infinite_ones(seven_joint_urdf):
     limit = seven_joint_urdf[seven_joint_urdf.index("<limit") :]
     limit = limit[: limit.index("/>") + 2]
     text = seven_joint_urdf.replace(limit, "").replace('"joint1" type="revolute"', '"joint1" type="continuous"')
@@ -225,194 +177,3 @@ def test_gravity_hangs_on_how_the_base_is_mounted(seven):
     g = 9.81
     R_WB = RollPitchYaw(0.5, -0.3, 1.1).ToRotationMatrix().matrix()
     np.testing.assert_allclose(seven.gravity_B, R_WB.T @ [0, 0, -g], atol=1e-12)
-
-
-# The hash of the nominal model
-
-
-def test_the_hash_does_not_depend_on_where_the_robot_stands(load, seven_joint_urdf, seven, ur5, spec):
-    stand = 'xyz="0.3 -0.2 0.7" rpy="0.5 -0.3 1.1"'
-    for elsewhere in ('xyz="0 0 0" rpy="0 0 0"', 'xyz="-12.3 4.5 6.7" rpy="1 2 3"', 'xyz="1e3 0 0" rpy="-3 0.1 0"'):
-        moved = read_robot(load(seven_joint_urdf.replace(stand, elsewhere)))
-        assert not np.allclose(moved.X_WB, seven.X_WB)
-        assert moved.model_sha256 == seven.model_sha256
-    assert read_robot(load_plant(spec("ur5 cell")[0])).model_sha256 == ur5.model_sha256
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('xyz="0.04 -0.03 0.19"', 'xyz="0.04 -0.03001 0.19"'),  # a link, 10 um
-        ('rpy="0.4 0.3 -0.6"', 'rpy="0.4 0.3 -0.60001"'),  # a joint, 10 urad
-        ('axis xyz="0 -1 0"', 'axis xyz="0 1 0"'),  # a sense of rotation
-        ('rpy="0.3 -0.2 0.4"', 'rpy="0.3 -0.2 0.401"'),  # a bracket between two joints
-        ('xyz="0.02 -0.01 0.09"', 'xyz="0.02 -0.01 0.0901"'),  # the flange
-        ('"joint5"', '"joint_5"'),  # a name
-    ],
-)
-def test_the_hash_changes_with_the_geometry_and_with_the_names_of_the_joints(load, seven_joint_urdf, seven, old, new):
-    assert old in seven_joint_urdf
-    assert read_robot(load(seven_joint_urdf.replace(old, new))).model_sha256 != seven.model_sha256
-
-
-def test_the_hash_does_not_change_with_masses_or_limits(load, seven_joint_urdf, seven):
-    text = seven_joint_urdf.replace('<mass value="3.1"/>', '<mass value="9"/>').replace('upper="2.1"', 'upper="2.05"')
-    other = read_robot(load(text))
-    assert other.link_mass_kg[0] != seven.link_mass_kg[0]
-    assert other.upper_rad[1] != seven.upper_rad[1]
-    assert other.model_sha256 == seven.model_sha256
-
-
-def test_the_hash_does_not_change_with_noise_far_below_a_nanometre(seven):
-    noise = 1e-13 * np.random.default_rng(0).normal(size=(7, 4, 4))
-    assert replace(seven, X_BA=seven.X_BA + noise, X_BF=seven.X_BF - noise[0]).model_sha256 == seven.model_sha256
-
-
-def test_the_hash_tells_the_built_in_robots_apart(ur5, ur10, seven):
-    assert len({ur5.model_sha256, ur10.model_sha256, seven.model_sha256}) == 3
-
-
-# Plants with more than one arm, or with none
-
-
-@pytest.fixture(scope="module")
-def two_arms(seven_joint_arm):
-    """A UR5 and the seven-joint arm; the UR5 hangs from the ceiling."""
-    plant = MultibodyPlant(0.0)
-    parser = make_parser(plant)
-    ur5 = parser.AddModels(str(models_dir() / "ur5" / "ur5.urdf"))[0]
-    seven = parser.AddModels(str(seven_joint_arm))[0]
-    X_WB = RigidTransform(RollPitchYaw(np.pi, 0, 0.4), [0.5, 0, 2])
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link", ur5), X_WB)
-    plant.Finalize()
-    return plant, ur5, seven
-
-
-def test_of_two_arms_the_one_is_read_that_is_asked_for(two_arms, ur5, seven):
-    plant, *instances = two_arms
-    for instance, alone, base in zip(instances, (ur5, seven), ("base_link", "foot"), strict=True):
-        robot = read_robot(plant, model_instance=instance)
-        assert (robot.name, robot.joint_names) == (alone.name, alone.joint_names)
-        assert robot.model_sha256 == alone.model_sha256
-        np.testing.assert_allclose(robot.link_mass_kg, alone.link_mass_kg, rtol=1e-12)
-        judge = Judge(plant, alone.name, base, "flange")
-        for q in some_angles(robot, 4):
-            judge.move(robot, q)
-            np.testing.assert_allclose(robot.gravity_torque(q)[0], judge.gravity_torque(robot), atol=1e-9)
-
-
-def test_two_arms_are_refused_by_name_where_nobody_says_which(two_arms):
-    with pytest.raises(InputError) as caught:
-        read_robot(two_arms[0])
-    assert caught.value.problem == "cannot tell which model in the plant is the arm"
-    assert caught.value.found == "ur5, seven"
-    assert "model_instance given" in caught.value.expected
-
-
-def test_a_plant_without_an_arm_is_refused():
-    plant = MultibodyPlant(0.0)
-    make_parser(plant).AddModels(str(models_dir() / "cell" / "table.urdf"))
-    plant.Finalize()
-    with pytest.raises(InputError, match="cannot tell which model in the plant is the arm") as caught:
-        read_robot(plant)
-    assert caught.value.found == "no revolute joint"
-
-
-def test_an_unfinalized_plant_is_refused(seven_joint_arm):
-    plant = MultibodyPlant(0.0)
-    Parser(plant).AddModels(str(seven_joint_arm))
-    with pytest.raises(InputError, match="the plant is not finalized"):
-        read_robot(plant)
-
-
-def test_a_prismatic_joint_in_the_chain_is_refused_by_name(load, seven_joint_urdf):
-    plant = load(seven_joint_urdf.replace('"joint5" type="revolute"', '"joint5" type="prismatic"'))
-    with pytest.raises(InputError, match="joint 'joint5' is of a type that truepath does not calibrate") as caught:
-        read_robot(plant)
-    assert caught.value.found == "prismatic"
-
-
-def test_a_prismatic_joint_beside_the_chain_does_no_harm(load, seven_joint_urdf, seven):
-    text = seven_joint_urdf.replace('"counterweight_mount" type="fixed"', '"counterweight_mount" type="prismatic"')
-    robot = read_robot(load(text))
-    assert robot.model_sha256 == seven.model_sha256
-    np.testing.assert_allclose(robot.gravity_torque(np.ones(7)), seven.gravity_torque(np.ones(7)), atol=1e-9)
-
-
-def test_a_rail_below_the_base_is_no_part_of_the_arm(load, seven_joint_urdf, seven):
-    robot = read_robot(
-        load(
-            seven_joint_urdf.replace('<link name="world"/>', '<link name="world"/><link name="carriage"/>')
-            .replace('<parent link="world"/>', '<parent link="carriage"/>')
-            .replace(
-                "</robot>",
-                '<joint name="rail" type="prismatic"><parent link="world"/><child link="carriage"/></joint></robot>',
-            )
-        ),
-        base_frame="foot",
-    )
-    assert robot.model_sha256 == seven.model_sha256
-
-
-# Base and flange of one's own choice
-
-
-def test_base_and_flange_may_be_other_frames_of_the_model(load, seven_joint_urdf, seven):
-    plant = load(seven_joint_urdf)
-    part = read_robot(plant, base_frame="link2", flange_frame="bracket6")
-    assert part.joint_names == ("joint3", "joint4", "joint5", "joint6")
-    context = plant.CreateDefaultContext()
-    X = plant.GetFrameByName("bracket6").CalcPose(context, plant.GetFrameByName("link2"))
-    np.testing.assert_allclose(part.X_BF, X.GetAsMatrix4(), atol=1e-12)
-
-
-def test_a_tool_frame_added_by_a_host_program_may_be_the_flange(load, seven_joint_urdf, seven):
-    X_FT = RigidTransform(RollPitchYaw(0.1, 0.2, 0.3), [0.01, 0.02, 0.3])
-
-    def add_tool(plant):
-        plant.AddFrame(FixedOffsetFrame("my_tool", plant.GetFrameByName("flange"), X_FT))
-
-    robot = read_robot(load(seven_joint_urdf, add_tool), flange_frame="my_tool")
-    np.testing.assert_allclose(robot.X_BF, seven.X_BF @ X_FT.GetAsMatrix4(), atol=1e-12)
-
-
-def test_without_a_frame_that_is_called_flange_the_single_end_of_the_chain_is_taken(load, seven_joint_urdf, seven):
-    text = seven_joint_urdf.replace('"flange"', '"gripper"').replace(
-        '<parent link="link3"/><child link="counterweight"/>', '<parent link="gripper"/><child link="counterweight"/>'
-    )
-    assert read_robot(load(text)).num_joints == 7
-
-
-def test_without_such_a_frame_two_ends_are_refused_by_name(load, seven_joint_urdf):
-    with pytest.raises(InputError, match="cannot tell which body carries the tool") as caught:
-        read_robot(load(seven_joint_urdf.replace('"flange"', '"gripper"')))
-    assert caught.value.found == "counterweight, gripper"
-
-
-@pytest.mark.parametrize("argument", ["base_frame", "flange_frame"])
-def test_an_unknown_frame_is_refused_and_the_known_ones_are_told(load, seven_joint_urdf, argument):
-    with pytest.raises(InputError, match="no frame called 'flansch'") as caught:
-        read_robot(load(seven_joint_urdf), **{argument: "flansch"})
-    assert "flange" in caught.value.expected
-
-
-@pytest.mark.parametrize("argument", ["base_frame", "flange_frame"])
-def test_a_frame_name_that_several_other_models_have_is_refused(seven_joint_arm, argument):
-    plant = MultibodyPlant(0.0)
-    parser = make_parser(plant)
-    parser.SetAutoRenaming(True)
-    for path in (seven_joint_arm, *2 * [models_dir() / "cell" / "tool.urdf"]):
-        parser.AddModels(str(path))
-    plant.Finalize()
-    with pytest.raises(InputError, match="tool_tip"):
-        read_robot(plant, **{argument: "tool_tip"})
-
-
-def test_a_flange_that_does_not_hang_on_the_base_is_refused(load, seven_joint_urdf):
-    with pytest.raises(InputError, match="'link2' does not hang on frame 'link5'"):
-        read_robot(load(seven_joint_urdf), base_frame="link5", flange_frame="link2")
-
-
-def test_a_single_joint_is_no_arm(load, seven_joint_urdf):
-    with pytest.raises(InputError, match="is no arm"):
-        read_robot(load(seven_joint_urdf), base_frame="foot", flange_frame="link1")
