@@ -55,7 +55,7 @@ def test_it_is_done_by_commands_that_can_be_typed(loop):
 
 def test_what_was_measured_and_written_lies_in_one_folder(loop):
     names = {path.name for path in loop[1].iterdir()}
-    assert names >= {"poses.csv", "measured.csv", "report.html", "preview.html", "corrected.script", "run.csv"}
+    assert names >= {"plan.csv", "measured.csv", "report.html", "preview.html", "corrected.script", "run.csv"}
 
 
 def test_bad_input_gives_one_message_and_exit_code_2(tmp_path):

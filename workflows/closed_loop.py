@@ -96,9 +96,9 @@ class Loop:
         """The steps; the exit code."""
         began, options = time.monotonic(), self.options
         by = ("--calibration", "calibration.json")
-        self._truepath("plan", "--robot", CELL, "--poses", options.poses, "--effects", options.hide, "-o", "poses.csv")
+        self._truepath("plan", "--robot", CELL, "--poses", options.poses, "--effects", options.hide, "-o", "plan.csv")
         with self._controller(options.speed_up):
-            self._record("poses.csv", "measured.csv")
+            self._record("plan.csv", "measured.csv")
             states = ("--measured-in", "world", "--probe", "model")
             self._truepath("diagnose", "measured.csv", "--robot", CELL, *states, "-o", ".")
             calibration = load_calibration(self.folder / "calibration.json")
