@@ -6,7 +6,6 @@ shapes, rotations, the hash of the nominal model, and a checksum over the whole 
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from functools import cached_property
@@ -29,6 +28,7 @@ from truepath.calibration_parts import (
     RobotPart,
 )
 from truepath.calibration_residual import ResidualPart
+from truepath.checksum import checksum
 from truepath.errors import InputError
 from truepath.files import write_atomically
 from truepath.model import CalibratedModel
@@ -102,7 +102,7 @@ class Calibration(Part):
     def to_json(self) -> str:
         """Text of the file: indented JSON that ends with a checksum over all that stands before it."""
         content = self.model_dump(by_alias=True)
-        return json.dumps({**content, "checksum": _checksum(content)}, indent=1, allow_nan=False) + "\n"
+        return json.dumps({**content, "checksum": checksum(content)}, indent=1, allow_nan=False) + "\n"
 
     def save(self, path: str | Path) -> None:
         """Writes the file as a whole or not at all."""
@@ -130,13 +130,13 @@ def load_calibration(path: str | Path, robot: NominalRobot | None = None) -> Cal
             expected=f"schema {SCHEMA!r}",
             found=repr(schema)[:80] + (" (update truepath to read it)" if newer else ""),
         )
-    checksum = content.pop("checksum", None)
-    if checksum != _checksum(content):
+    stated = content.pop("checksum", None)
+    if stated != checksum(content):
         raise InputError(
             "the calibration was changed after truepath wrote it",
             file=path,
             expected="the checksum of its content",
-            found="no checksum" if checksum is None else "another one",
+            found="no checksum" if stated is None else "another one",
         )
     try:
         calibration = Calibration.model_validate(content)
@@ -177,8 +177,3 @@ def _without_doubles(pairs: list[tuple[str, object]]) -> dict:
     if len(content) < len(pairs):
         raise ValueError("a name appears twice in one object")
     return content
-
-
-def _checksum(content: dict) -> str:
-    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(canonical.encode()).hexdigest()

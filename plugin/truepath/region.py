@@ -49,9 +49,12 @@ def cover(q_rad: Array) -> Region:
     return Region(q_rad.min(axis=0), q_rad.max(axis=0), mean, whitening, radius)
 
 
-def fade(theta: Array, lower_rad: Array | float, upper_rad: Array | float) -> Array:
-    """1 within the limits, 0 beyond ten degrees outside, smooth between; any shapes that broadcast."""
-    return smooth_step(1.0 - np.maximum(lower_rad - theta, theta - upper_rad) / FADE_RAD)
+def fade(theta: Array, lower_rad: Array | float, upper_rad: Array | float, over_rad: float = FADE_RAD) -> Array:
+    """1 within the limits, 0 so far outside, ten degrees if not said otherwise, smooth between.
+
+    Any shapes that broadcast.
+    """
+    return smooth_step(1.0 - np.maximum(lower_rad - theta, theta - upper_rad) / over_rad)
 
 
 def smooth_step(t: Array) -> Array:

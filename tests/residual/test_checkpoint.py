@@ -9,6 +9,7 @@ from by_loop import random_network
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from signed_content import signed
 from truepath.errors import InputError
 from truepath.residual.checkpoint import SCHEMA, Checkpoint
 from truepath.residual.learning import Lesson, learn_network, learn_networks
@@ -138,7 +139,7 @@ def test_with_other_data_or_settings_nothing_is_taken_from_it_and_nothing_in_it_
 
 def test_the_file_says_what_it_is(stopped):
     content = json.loads(stopped.read_text())
-    assert content["schema"] == SCHEMA == "truepath.evolution/1"
+    assert content["schema"] == SCHEMA == "truepath.evolution/2"
     assert [state["generation"] for state in content["under_way"].values()] == [5]
 
 
@@ -167,20 +168,37 @@ def test_a_file_that_is_no_checkpoint_is_refused_by_name(tmp_path):
         b"[]",
         b"{}",
         b'{"schema": "truepath.calibration/1"}',
-        b'{"schema": "truepath.evolution/2", "finished": {}, "under_way": {}}',
-        b'{"schema": "truepath.evolution/1", "finished": [], "under_way": {}}',
-        b'{"schema": "truepath.evolution/1", "finished": {}, "under_way": {}, "more": 1}',
-        b'{"schema": "truepath.evolution/1", "finished": {}}',
+        b'{"schema": "truepath.evolution/3", "finished": {}, "under_way": {}}',
+        b'{"schema": "truepath.evolution/2", "finished": [], "under_way": {}}',
+        b'{"schema": "truepath.evolution/2", "finished": {}, "under_way": {}, "more": 1}',
+        b'{"schema": "truepath.evolution/2", "finished": {}}',
         b"\xff\xfe",
         b"q1_rad,q2_rad\n0,0\n",
         b"[" * 100_000,
-        b'{"schema": "truepath.evolution/1", "finished": {"a": {"hidden": [[NaN, 1]], "output": [[1]], "bias": [1]}}, '
+        b'{"schema": "truepath.evolution/2", "finished": {"a": {"hidden": [[NaN, 1]], "output": [[1]], "bias": [1]}}, '
         b'"under_way": {}}',
     ):
         path.write_bytes(content)
         with pytest.raises(InputError, match=r"other\.json: this is no checkpoint"):
             Checkpoint(path)
         assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"schema": "truepath.evolution/3", "finished": {}, "under_way": {}},
+        {"schema": SCHEMA, "finished": [], "under_way": {}},
+        {"schema": SCHEMA, "finished": {}, "under_way": {}, "more": 1},
+        {"schema": SCHEMA, "finished": {}},
+        {"schema": SCHEMA, "finished": {"a": {"hidden": [[float("nan"), 1]], "output": [[1]], "bias": [1]}}},
+    ],
+)
+def test_a_checksum_alone_makes_no_checkpoint(tmp_path, content):
+    path = tmp_path / "other.json"
+    path.write_text(json.dumps(signed(content)))
+    with pytest.raises(InputError, match=r"other\.json: this is no checkpoint"):
+        Checkpoint(path)
 
 
 def test_a_folder_is_no_checkpoint(tmp_path):
@@ -225,6 +243,7 @@ SPOILT = {
     "an error that single precision does not know": lambda state: state["error"].__setitem__(0, 1e300),
     "an endless error": lambda state: state["error"].__setitem__(0, float("inf")),
     "a negative error": lambda state: state["error"].__setitem__(0, -1.0),
+    "a generation after the last": lambda state: state.update(generation=EVOLUTION.generations + 1),
     "a negative generation": lambda state: state.update(generation=-1),
     "half a generation": lambda state: state.update(generation=1.5),
     "a negative count": lambda state: state.update(stale=-3),
@@ -237,19 +256,29 @@ SPOILT = {
 def test_an_evolution_that_makes_no_sense_is_refused_by_name(stopped, lesson, kind):
     content = json.loads(stopped.read_text())
     SPOILT[kind](_state(content))
-    stopped.write_text(json.dumps(content))
+    stopped.write_text(json.dumps(signed(content)))
     with pytest.raises(InputError, match=r"checkpoint\.json"):
         resumed(stopped, lesson)
 
 
 @pytest.mark.parametrize(
-    "network", [_network(inputs=6), _network(outputs=6), _network(size=1e300)], ids=["inputs", "outputs", "huge"]
+    "network",
+    [_network(inputs=6), _network(outputs=6), _network(size=1e300), _network(neurons=7)],
+    ids=["inputs", "outputs", "huge", "neurons"],
 )
 def test_a_finished_network_that_cannot_be_one_of_these_is_refused_by_name(stopped, lesson, network):
     content = json.loads(stopped.read_text())
     key = next(iter(content["under_way"]))
-    stopped.write_text(json.dumps({**content, "finished": {key: network}, "under_way": {}}))
+    stopped.write_text(json.dumps(signed({**content, "finished": {key: network}, "under_way": {}})))
     with pytest.raises(InputError, match=r"checkpoint\.json"):
+        resumed(stopped, lesson)
+
+
+def test_a_number_that_was_changed_is_noticed(stopped, lesson):
+    content = json.loads(stopped.read_text())
+    _state(content)["individuals"][0]["bias"][0] += 1e-3
+    stopped.write_text(json.dumps(content))
+    with pytest.raises(InputError, match="its checksum is not that of its content"):
         resumed(stopped, lesson)
 
 
@@ -279,5 +308,5 @@ def test_a_run_that_is_done_takes_only_its_own_entries_away(tmp_path, lesson):
         desk = Checkpoint(path)
         learn_network(one, replace(OPTIONS, checkpoint=desk))
     desk.remove()
-    assert Checkpoint(path).finished(Checkpoint.key(other, OPTIONS), other) is not None
-    assert Checkpoint(path).finished(Checkpoint.key(lesson, OPTIONS), lesson) is None
+    assert Checkpoint(path).finished(Checkpoint.key(other, OPTIONS), other, OPTIONS) is not None
+    assert Checkpoint(path).finished(Checkpoint.key(lesson, OPTIONS), lesson, OPTIONS) is None

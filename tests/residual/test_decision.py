@@ -212,14 +212,14 @@ def test_a_gain_that_unseen_poses_do_not_confirm_is_not_accepted(ur5, odd, monke
 
 
 @pytest.mark.parametrize("seed", [0, 1, *map(also_slow, (2, 3))])
-def test_beyond_the_data_a_robot_with_networks_is_never_worse_than_without(ur5, seed, capsys):
-    """One joint, or all of them, driven 20 degrees beyond what was measured; 5 and 10 degrees are told."""
+def test_beyond_the_data_networks_never_make_a_robot_worse_by_more_than_a_twentieth(ur5, seed, capsys):
+    """One joint, or all of them, driven beyond what was measured; at 20 degrees networks say nothing any more."""
     odd = arm(seed)
     data = campaign(odd, joints(200, seed), seed=seed)
     model = with_network(calibrate(ur5, data), data, Context.of(data), QUICK).model
     plain, reach = replace(model, residual=None), model.residual.reach
     rng = np.random.default_rng(seed)
-    for degrees in (5, 10, 20):
+    for degrees in (1, 2, 3, 5, 10, 20):
         ratios = {}
         for driven in (1, 2, 6):
             q = joints(300, 100 + seed)
@@ -232,5 +232,4 @@ def test_beyond_the_data_a_robot_with_networks_is_never_worse_than_without(ur5, 
         with capsys.disabled():
             told = ", ".join(f"{driven} joints {ratio:.3f}" for driven, ratio in ratios.items())
             print(f"\nseed {seed}, {degrees} degrees beyond: error with networks over error without: {told}")
-        if degrees == 20:
-            assert max(ratios.values()) <= 1.0 + 1e-12
+        assert max(ratios.values()) <= (1.05 if degrees < 5 else 1.0 + 1e-12)

@@ -54,7 +54,7 @@ def test_at_fresh_poses_of_the_same_kind_the_weight_is_nearly_always_1(kind, cou
 
 
 def test_few_poses_reach_nearly_as_far_for_a_fresh_one_often_lies_beyond_all_of_them_in_some_joint():
-    assert Reach.of(poses(60, 1)).weight(poses(2000, 2)).mean() > 0.85
+    assert Reach.of(poses(60, 1)).weight(poses(2000, 2)).mean() > 0.8
 
 
 def test_visits_of_the_same_poses_again_reach_as_far_as_one_visit(measured):

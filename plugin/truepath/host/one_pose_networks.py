@@ -8,9 +8,8 @@ import casadi as ca
 import numpy as np
 
 from truepath.lie import Array
-from truepath.region import FADE_RAD
 from truepath.residual.ensemble import NetworkResidual
-from truepath.residual.reach import FADES_FROM, FADES_TO, SHARPNESS, Reach
+from truepath.residual.reach import FADES_FROM, FADES_TO, JOINT_FADE_RAD, SHARPNESS, Reach
 
 
 @lru_cache(maxsize=8)
@@ -35,7 +34,7 @@ def network_shift(residual: NetworkResidual) -> ca.Function:
 def _weight(reach: Reach, q: ca.MX, x: ca.MX) -> ca.MX:
     """``Reach.weight``."""
     beyond = ca.fmax(reach.lower_rad - q, q - reach.upper_rad)
-    alone = _smooth_step(1.0 - beyond / FADE_RAD)
+    alone = _smooth_step(1.0 - beyond / JOINT_FADE_RAD)
     poses: Array = reach.scaled(reach.poses_rad)
     square = ca.fmax(ca.sumsqr(x) + np.sum(poses**2, axis=1) - 2.0 * ca.mtimes(ca.DM(poses), x), 0.0)
     sharpness, nearest = SHARPNESS / reach.median**2, ca.mmin(square)

@@ -1,7 +1,8 @@
 """What has been learnt so far, in a file: an interrupted run goes on where it was, and ends as if it had not been.
 
-Plain JSON, checked when it is read; entries belong to what was to be learnt (its hash is their name), so a file of
-other data or other settings is never mistaken for one of these.
+Plain JSON with a checksum, checked when it is read; entries belong to what was to be learnt (its hash is their name),
+so a file of other data or other settings is never mistaken for one of these. ``SCHEMA`` counts up when an evolution
+would go on in another way than it began.
 """
 
 from __future__ import annotations
@@ -20,16 +21,18 @@ from pydantic import Field, ValidationError
 
 from truepath.calibration_parts import Part
 from truepath.calibration_residual import LARGEST, NetworkPart
+from truepath.checksum import checksum
 from truepath.errors import InputError
 from truepath.files import write_atomically
 
 if TYPE_CHECKING:
     from truepath.residual.evolution import State
     from truepath.residual.learning import Lesson
+    from truepath.residual.limits import Settings
     from truepath.residual.network import Network
     from truepath.residual.options import Options
 
-SCHEMA: Literal["truepath.evolution/1"] = "truepath.evolution/1"
+SCHEMA: Literal["truepath.evolution/2"] = "truepath.evolution/2"
 MAX_BYTES = 1 << 30
 SECONDS_BETWEEN = 2.0
 
@@ -48,7 +51,7 @@ class StatePart(Part):
 
 
 class Content(Part):
-    schema_: Literal["truepath.evolution/1"] = Field(alias="schema")
+    schema_: Literal["truepath.evolution/2"] = Field(alias="schema")
     finished: dict[str, NetworkPart]
     under_way: dict[str, StatePart]
 
@@ -89,11 +92,11 @@ class Checkpoint:
         digest.update(json.dumps(how, sort_keys=True).encode())
         return digest.hexdigest()
 
-    def finished(self, key: str, lesson: Lesson) -> Network | None:
+    def finished(self, key: str, lesson: Lesson, options: Options) -> Network | None:
         """The network, if it was finished."""
         self._asked.add(key)
         part = self._finished.get(key)
-        return None if part is None else self._fitting([part], lesson)[0]
+        return None if part is None else self._fitting([part], lesson, options.evolution)[0]
 
     def state(self, key: str, lesson: Lesson, options: Options) -> State | None:
         """Where its evolution was interrupted, if it was."""
@@ -105,21 +108,22 @@ class Checkpoint:
         from truepath.residual.evolution import State
         from truepath.residual.population import Population
 
-        settings, networks = options.evolution, self._fitting(part.individuals, lesson)
-        sizes = [network.neurons for network in networks]
-        complete = len(sizes) == len(part.error) == settings.individuals
-        if not complete or min(sizes) < settings.smallest or max(sizes) > settings.largest:
-            raise _refused(self.path, "individuals in another number or of other size than this evolution has")
+        settings = options.evolution
+        networks = self._fitting(part.individuals, lesson, settings)
+        if not len(networks) == len(part.error) == settings.individuals or part.generation > settings.generations:
+            raise _refused(self.path, "individuals or generations in another number than this evolution has")
         device = torch.device(options.device)
         population = Population.of(networks, settings.largest, device, torch.float32)
         error = torch.tensor(part.error, dtype=torch.float32, device=device)
         return State(population, error, part.generation, part.stale, part.reference)
 
-    def _fitting(self, parts: list[NetworkPart], lesson: Lesson) -> list[Network]:
+    def _fitting(self, parts: list[NetworkPart], lesson: Lesson, settings: Settings) -> list[Network]:
         networks = [part.network() for part in parts]
         inputs, outputs = lesson.x.shape[1], lesson.target.shape[1]
         if any(network.hidden.shape[1] != inputs + 1 or len(network.bias) != outputs for network in networks):
             raise _refused(self.path, f"networks that have not {inputs} inputs and {outputs} outputs")
+        if any(not settings.smallest <= network.neurons <= settings.largest for network in networks):
+            raise _refused(self.path, "networks of other sizes than this evolution has")
         return networks
 
     def keep_state(self, key: str, state: State) -> None:
@@ -156,8 +160,8 @@ class Checkpoint:
 
     def _write(self) -> None:
         under_way = self._read | {key: _part(state) for key, state in self._states.items()}
-        content = Content(schema=SCHEMA, finished=self._finished, under_way=under_way)
-        write_atomically(self.path, content.model_dump_json(by_alias=True))
+        content = Content(schema=SCHEMA, finished=self._finished, under_way=under_way).model_dump(by_alias=True)
+        write_atomically(self.path, json.dumps({**content, "checksum": checksum(content)}, allow_nan=False))
         self._written = time.monotonic()
 
 
@@ -169,9 +173,15 @@ def _load(path: Path) -> Content:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise _refused(path, "a file larger than 1 GiB")
-        return Content.model_validate_json(path.read_bytes())
+        content = json.loads(path.read_bytes())
     except OSError as error:
         raise _refused(path, error.strerror or "the system refuses to read it") from None
+    except (ValueError, RecursionError):
+        raise _refused(path, "it is cut off or no JSON") from None
+    if not isinstance(content, dict) or content.pop("checksum", None) != checksum(content):
+        raise _refused(path, "its checksum is not that of its content: it was changed, or begun by another version")
+    try:
+        return Content.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])

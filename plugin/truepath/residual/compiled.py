@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from typing import Any
 
@@ -35,9 +36,31 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     """The function as machine code that leaves other Python threads alone; kept on disk where that is possible."""
     options |= {"nogil": True, "error_model": "numpy"}
     try:
-        return njit(function, cache=True, **options)
+        kernel = njit(function, cache=True, **options)
     except RuntimeError:  # there is no folder that can be written
         return njit(function, **options)
+    kernel._cache = _Forgiving(kernel._cache)
+    return kernel
+
+
+class _Forgiving:
+    """What numba keeps on disk, when it can be read and written; it is no reason to fail if it cannot."""
+
+    def __init__(self, kept: Any) -> None:
+        self._kept = kept
+
+    def load_overload(self, *what: Any) -> Any:
+        try:
+            return self._kept.load_overload(*what)
+        except Exception:  # spoilt files raise whatever their bytes mean
+            return None
+
+    def save_overload(self, *what: Any) -> None:
+        with suppress(Exception):
+            self._kept.save_overload(*what)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._kept, name)
 
 
 @partial(compiled, inline="always", fastmath=FAST)

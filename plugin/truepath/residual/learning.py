@@ -52,7 +52,7 @@ def learn_network(
     seen = ~lesson.validation
     desk = options.checkpoint
     key = "" if desk is None else desk.key(lesson, options)
-    if desk is not None and (finished := desk.finished(key, lesson)) is not None:
+    if desk is not None and (finished := desk.finished(key, lesson, options)) is not None:
         return finished
 
     def observe(state: State) -> None:
