@@ -1,9 +1,12 @@
 """What the kernels of an evolution are made of: a logistic function, chance, and machine code that may be kept."""
 
+import shutil
 import subprocess
 import sys
 
+import numba
 import numpy as np
+import pytest
 from scipy.special import expit
 from scipy.stats import kstest
 from truepath.residual import compiled
@@ -71,6 +74,35 @@ def test_what_one_process_has_compiled_the_next_one_finds():
     command = [sys.executable, "-c", GENERATION]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     assert subprocess.run(command, check=True, capture_output=True, text=True).stdout.split() == ["0"]
+
+
+def kept_kernels(folder, monkeypatch):
+    """A quick kernel, as one process after the other compiles it or finds it on the disk."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(folder))
+    return [compiled.compiled(doubled) for _ in range(2)]
+
+
+def doubled(number):
+    return 2 * number
+
+
+@pytest.mark.parametrize("ending", ["nbc", "nbi"])
+def test_spoilt_files_of_the_compiler_are_made_anew(tmp_path, monkeypatch, ending):
+    first, second = kept_kernels(tmp_path, monkeypatch)
+    assert first(21) == 42
+    for path in tmp_path.rglob(f"*.{ending}"):
+        path.write_bytes(path.read_bytes()[:40])
+    assert second(21) == 42
+    third = kept_kernels(tmp_path, monkeypatch)[0]
+    assert third(21) == 42
+    assert sum(third.stats.cache_hits.values()) == 1
+
+
+def test_a_folder_that_goes_away_is_no_reason_to_fail(tmp_path, monkeypatch):
+    kernel = kept_kernels(tmp_path / "there", monkeypatch)[0]
+    shutil.rmtree(tmp_path / "there")
+    (tmp_path / "there").write_text("now a file")
+    assert kernel(21) == 42
 
 
 def test_numba_is_loaded_when_networks_are_evaluated_and_no_sooner():

@@ -53,6 +53,8 @@ class _Forgiving:
         try:
             return self._kept.load_overload(*what)
         except Exception:  # spoilt files raise whatever their bytes mean
+            with suppress(Exception):
+                self._kept.flush()  # begins anew
             return None
 
     def save_overload(self, *what: Any) -> None:
