@@ -9,27 +9,30 @@ from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from truepath.calibration_parts import Finite, Part
+from truepath.residual.limits import SIGNIFICANT
 
 if TYPE_CHECKING:
     from truepath.residual.ensemble import NetworkResidual
     from truepath.residual.network import Network
     from truepath.residual.proof import Proof
 
-LARGEST = 1e12  # no weight and no angle is beyond it; sums and products of larger numbers may be no numbers
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Rows = list[list[Number]]
+LARGEST = 1e12  # no error is beyond it; sums and products of larger numbers may be no numbers
+Weight = Annotated[float, Field(ge=-1e6, le=1e6)]  # of scaled inputs and outputs
+Rows = list[list[Weight]]
+MOST_NEURONS, MOST_NETWORKS, MOST_POSES = 1000, 100, 500  # the last as ``Reach.of`` has it
 Angle = Annotated[float, Field(ge=-100.0, le=100.0)]  # rad: no arm turns so often
-Distance = Annotated[float, Field(ge=1e-6, le=100.0)]  # as ``Reach.of`` has it
-Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+Distance = Annotated[float, Field(ge=1e-6, le=10.0)]  # half ranges of joints: poses of one arm are not further apart
+Scale = Annotated[float, Field(gt=0, le=0.1)]  # m or rad: more is no residual
+Place = Annotated[float, Field(ge=-10.0, le=10.0)]  # m from the flange
 KINDS = (3, 6)  # outputs: a position, or a position and a turn
 
 
 class NetworkPart(Part):
     """A network: ``hidden`` neuron by neuron with the threshold last, ``output`` output by output, ``bias``."""
 
-    hidden: Annotated[Rows, Field(min_length=1)]
-    output: Annotated[Rows, Field(min_length=1)]
-    bias: list[Number]
+    hidden: Annotated[Rows, Field(min_length=1, max_length=MOST_NEURONS)]
+    output: Annotated[Rows, Field(min_length=1, max_length=max(KINDS))]
+    bias: list[Weight]
 
     @classmethod
     def of(cls, network: Network) -> NetworkPart:
@@ -62,7 +65,7 @@ class ReachPart(Part):
 
     lower_rad: list[Angle]
     upper_rad: list[Angle]
-    poses_rad: Annotated[list[list[Angle]], Field(min_length=1)]
+    poses_rad: Annotated[list[list[Angle]], Field(min_length=1, max_length=MOST_POSES)]
     median: Distance
     spacing: Distance
 
@@ -73,6 +76,12 @@ class ProofPart(Part):
     p_value: Annotated[Finite, Field(ge=0, le=1)]
     before_mm: Annotated[Finite, Field(ge=0)]
     after_mm: Annotated[Finite, Field(ge=0)]
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        if self.p_value >= SIGNIFICANT or self.after_mm >= self.before_mm:
+            raise ValueError("it proves nothing")
+        return self
 
     @classmethod
     def of(cls, proof: Proof) -> ProofPart:
@@ -85,10 +94,10 @@ class ResidualPart(Part):
     ``probe_m`` is where the probe sat on the flange when they learnt.
     """
 
-    networks: Annotated[list[NetworkPart], Field(min_length=2)]
-    scale: Annotated[list[Positive], Field(min_length=3, max_length=6)]
+    networks: Annotated[list[NetworkPart], Field(min_length=2, max_length=MOST_NETWORKS)]
+    scale: Annotated[list[Scale], Field(min_length=3, max_length=6)]
     reach: ReachPart
-    probe_m: Annotated[list[Number], Field(min_length=3, max_length=3)] | None
+    probe_m: Annotated[list[Place], Field(min_length=3, max_length=3)] | None
     proof: ProofPart
 
     @classmethod

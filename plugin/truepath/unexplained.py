@@ -32,6 +32,8 @@ def unexplained(trial: UnseenPoses, evidence: Evidence) -> Unexplained:
     if source == "neighbours":  # a fit makes residuals smaller than the noise is
         readings = residual.size
         floor *= float(np.sqrt(readings / max(readings - len(fit.covariance) - len(fit.values), 1)))
+        # Neighbours that arrived from different sides differ by more than noise: a floor is never above what is left.
+        floor = min(floor, trial.mean(trial.final))
     places: dict[str, set[int]] = {}
     for term in evidence.nameless:
         places.setdefault(term.effect, set()).update([] if term.joint is None else [term.joint])

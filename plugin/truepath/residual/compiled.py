@@ -36,7 +36,7 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     """The function as machine code that leaves other Python threads alone; kept on disk where that is possible."""
     options |= {"nogil": True, "error_model": "numpy"}
     try:
-        kernel = njit(function, cache=True, **options)
+        kernel: Any = njit(function, cache=True, **options)
     except RuntimeError:  # there is no folder that can be written
         return njit(function, **options)
     kernel._cache = _Forgiving(kernel._cache)

@@ -10,8 +10,9 @@ import numpy as np
 
 from truepath.errors import CalibrationError
 from truepath.residual.learning import learn_ensemble
+from truepath.residual.limits import SIGNIFICANT
 from truepath.residual.options import Options, require_device
-from truepath.residual.proof import SIGNIFICANT, FitTo, Proof, cross_validated
+from truepath.residual.proof import FitTo, Proof, cross_validated
 from truepath.residual.samples import Samples
 
 if TYPE_CHECKING:

@@ -1,10 +1,15 @@
-"""The settings of evolution and training. They know nothing of torch, so that a command line can have them at once."""
+"""The settings of evolution and training, and when networks count as proved.
+
+They know nothing of torch, so that a command line can have them at once.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from truepath.errors import InputError
+
+SIGNIFICANT = 0.01  # p value of there being no gain
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from truepath.kept_away import KeptAway
 from truepath.lie import Array
 from truepath.model import CalibratedModel
 from truepath.residual.learning import FEWEST_POSES, Progress, learn_for_each
+from truepath.residual.limits import SIGNIFICANT
 from truepath.residual.options import Options
 from truepath.residual.samples import Samples
 from truepath.splits import block_parts, random_parts
 
 FitTo = Callable[[Array, bool], CalibratedModel]  # to some rows; whether the frame may drift
 
-SIGNIFICANT = 0.01
 WORTH_MENTIONING_MM = 1e-4  # no tracker sees less; data without noise would prove any gain
 TOLERATED = 1.02  # times the orientation error without networks: less is chance, and nobody would notice
 FOLDS = 5
