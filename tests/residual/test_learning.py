@@ -123,6 +123,8 @@ def test_networks_learnt_on_all_cores_are_those_learnt_one_after_the_other(sampl
 def test_progress_tells_which_network_and_which_generation(samples):
     told = []
     learn_ensemble(samples, OPTIONS, "the title", told.append)
+    first, *told = told
+    assert first.startswith("the title: first generation")
     assert len(told) == 3 * QUICK.generations
     assert all(text.startswith("the title: network ") and " of 3, generation " in text for text in told)
 

@@ -101,6 +101,7 @@ def learn_networks(
     cores = 1 if options.device != "cpu" else os.cpu_count() or 1
     workers = min(len(lessons), cores)
     threads = cores // max(workers, 1)
+    progress(f"{title}: first generation (compiled when this is first used: some ten seconds)")
     with ThreadPoolExecutor(workers) as pool:
         futures = [pool.submit(one, lesson) for lesson in lessons]
         try:
