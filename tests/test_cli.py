@@ -147,6 +147,17 @@ def test_validate_prints_a_table_for_people(truepath, cell):
     assert "position, mm" in outcome.out
 
 
+def test_validate_says_of_poses_that_were_fitted_that_they_prove_nothing(truepath, cell):
+    measured = ("validate", cell / "measured.csv", "-c", cell / "ur5.json")
+    people, machines = truepath(*measured), truepath(*measured, "--json")
+    assert (people.code, machines.code) == (0, 0)
+    assert "was made from these very poses" in people.out
+    assert "was made from these very poses" in machines.err
+    assert list(machines.json()) == ["schema", "poses", "nominal", "calibrated"]
+    fresh = truepath("validate", cell / "fresh.csv", "-c", cell / "ur5.json")
+    assert "very poses" not in fresh.out + fresh.err
+
+
 @pytest.mark.parametrize(
     ("bound", "code"),
     [
@@ -178,6 +189,14 @@ def test_after_the_tracker_was_moved_a_few_poses_find_the_frames_again(truepath,
     outcome = truepath(*rest, "--refit-frames", cell / "moved_few.csv")
     assert outcome.code == 0
     assert outcome.json()["calibrated"]["position_mm"]["mean"] < 0.05
+
+
+def test_frames_are_not_found_again_from_poses_that_are_validated(truepath, cell, tmp_path):
+    rows = (cell / "moved.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "some.csv").write_text("".join([rows[0], *reversed(rows[1:13])]), newline="\r\n")
+    for few, shared in ((cell / "moved.csv", "60 of 60"), (tmp_path / "some.csv", "12 of 12")):
+        outcome = truepath("validate", cell / "moved.csv", "-c", cell / "ur5.json", "--refit-frames", few)
+        assert is_refused(outcome, few.name, "other poses", shared)
 
 
 def test_a_calibration_of_another_robot_is_refused(truepath, cell):

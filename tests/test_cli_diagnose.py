@@ -81,6 +81,7 @@ def test_the_command_says_what_it_found_and_what_it_wrote(outcome, content, fold
     said = " ".join(outcome.out.split())
     assert content["verdict"] in said
     assert "joint compliance" in said
+    assert f"error on {content['data']['unseen_poses']} poses kept away, mm" in said
     assert f"{POSES}" not in said.split("written:")[1]
     for path in folder.iterdir():
         assert path.name in said
@@ -175,9 +176,9 @@ def test_what_is_left_comes_with_its_chance_and_the_noise_floor(content):
 
 @pytest.fixture(scope="module")
 def crowded(few, tmp_path_factory):
-    """A folder of results with an older diagnosis in it and files of the customer: the data, and poses of his own."""
+    """A folder with an older diagnosis, which names no file, and files of the customer: the data, and his own poses."""
     folder = tmp_path_factory.mktemp("crowded")
-    for name in ("diagnosis.json", "report.html", "calibration.json", "poses_for_tuesday.csv"):
+    for name in ("diagnosis.json", "report.html", "calibration.json", "poses.csv", "poses_for_tuesday.csv"):
         (folder / name).write_text("old")
     (folder / "poses_monday.csv").write_bytes(few.read_bytes())
     return folder
@@ -200,18 +201,22 @@ def test_an_older_diagnosis_is_replaced_as_a_whole(for_machines, crowded):
 
 
 def test_files_of_the_customer_beside_the_results_stay_whatever_they_are_called(for_machines, crowded, few):
-    assert for_machines.code == 0
     assert (crowded / "poses_monday.csv").read_bytes() == few.read_bytes()
-    assert (crowded / "poses_for_tuesday.csv").read_text() == "old"
+    assert (crowded / "poses_for_tuesday.csv").read_text() == (crowded / "poses.csv").read_text() == "old"
+
+
+def test_what_to_measure_next_then_has_another_name(for_machines, crowded):
+    names = {item["measure_next"] for item in for_machines.json()["ambiguous"]} - {None}
+    assert "poses.csv" not in names
+    assert all(len(read_toolpath(crowded / name, 6).q_rad) >= 10 for name in names)
+    assert 'href="./measure_next.csv"' in (crowded / "report.html").read_text()
 
 
 def test_calibrate_with_effects_auto_learns_the_very_same_robot(truepath, data, folder, content, tmp_path):
     outcome = truepath("calibrate", data, "--robot", "ur5_cell", "--effects", "auto", "-o", tmp_path / "c.json")
     assert outcome.code == 0, outcome.err
-    mine, theirs = (
-        load_calibration(path).model_dump(exclude={"created_utc"})
-        for path in (tmp_path / "c.json", folder / "calibration.json")
-    )
+    files = (tmp_path / "c.json", folder / "calibration.json")
+    mine, theirs = (load_calibration(path).model_dump(exclude={"created_utc"}) for path in files)
     assert mine == theirs
 
 

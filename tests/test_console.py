@@ -47,6 +47,40 @@ def test_a_calibration_without_networks_says_nothing_of_them(plain, capsys):
     assert "network" not in printed(plain, capsys)
 
 
+def test_accuracy_on_poses_not_seen_says_how_they_came_to_be_unseen(plain, capsys):
+    assert "on 60 poses that the fit had not seen (cross-validated)" in printed(plain, capsys)
+    kept = plain.heldout.model_copy(update={"method": "a fifth of the poses, drawn at random, kept away", "poses": 12})
+    assert "on 12 poses that the fit had not seen (kept away)" in printed(
+        plain.model_copy(update={"heldout": kept}), capsys
+    )
+
+
+def test_what_proved_networks_is_told_from_what_the_table_shows(plain, networked, capsys):
+    told = []
+    for calibration in (plain, networked):
+        console.print_network(calibration, "the mean error falls from 0.1 to 0.09 mm")
+        told.append(capsys.readouterr().out)
+    assert all("neural residual: the mean error falls from 0.1 to 0.09 mm\n" in text for text in told)
+    assert ["cross-validated" in text for text in told] == [False, True]
+
+
+@pytest.mark.parametrize("asked", [{}, {"backlash": "in the model"}])
+def test_causes_that_were_asked_for_by_name_are_not_printed_as_proved_against_others(plain, asked, capsys):
+    effects = [SimpleNamespace(name="backlash", joint=j, cause="play", remedy="adjust it") for j in (2, 3)]
+    console.print_calibration(plain.model_copy(update={"effects": effects}), asked)
+    text = capsys.readouterr().out
+    assert f"backlash on joints 2 and 3{' (as asked)' if asked else ''}: play; adjust it\n" in text
+    assert ("no other cause was tried" in text) == ("repair nothing on this alone" in text) == bool(asked)
+
+
+def test_a_probe_far_from_its_stated_place_is_warned_of(plain, capsys):
+    assert "warning" not in printed(plain, capsys)
+    stated = plain.tool.nominal.model_copy(update={"translation_m": [0.5, 0.0, 0.0]})
+    tool = plain.tool.model_copy(update={"nominal": stated, "nominal_source": "given"})
+    text = printed(plain.model_copy(update={"tool": tool}), capsys)
+    assert "from where it was stated\nwarning: the probe is" in text
+
+
 def test_the_table_has_a_row_for_each_model_that_there_is(capsys):
     models = [accuracy(mm) for mm in (2.5, 0.05, 0.11, 0.06)]
     rows = {}
@@ -62,18 +96,21 @@ def test_the_table_has_a_row_for_each_model_that_there_is(capsys):
 
 
 @pytest.mark.parametrize("asked", [True, False])
-def test_a_diagnosis_says_what_became_of_networks_that_were_asked_for(asked, capsys):
+def test_a_diagnosis_says_what_became_of_networks_that_were_asked_for(plain, asked, capsys):
     diagnosis = SimpleNamespace(
+        calibration=plain,
         verdict="All is well.",
         stages=(),
         findings=(),
         ambiguous=(),
         unexplained=SimpleNamespace(hints=()),
         not_testable=(),
-        network=SimpleNamespace(why="left out: it gains nothing") if asked else None,
-        to_dict=lambda: {"data": {"outliers": []}},
+        network=SimpleNamespace(why="left out: it gains nothing", model=None) if asked else None,
+        to_dict=lambda: {"data": {"outliers": [], "unseen_poses": 0}},
     )
     console.print_diagnosis(diagnosis)
     text = capsys.readouterr().out
     assert ("left out: it gains nothing" in text) == asked
     assert ("neural residual" in text) == asked
+    assert "base found at" in text
+    assert "mm on the flange" in text

@@ -53,7 +53,7 @@ def test_every_file_is_there(demo):
     names = {path.name for path in folder.iterdir()}
     assert names - {"poses.csv", "poses2.csv"} == {
         *("measured.csv", "truth.json", "diagnosis.json", "report.html", "calibration.json"),
-        *("weld_path.corrected.csv", "preview.html"),
+        *("weld_path.corrected.csv", "weld_path.corrected.csv.truepath.json", "preview.html"),
     }
     assert result.report == folder / "report.html"
     assert result.preview == folder / "preview.html"

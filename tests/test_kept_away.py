@@ -74,6 +74,37 @@ def test_a_gain_is_the_difference_of_means_with_student_s_interval(trial, off, m
     np.testing.assert_allclose(gain.ci95_mm, interval)
 
 
+@pytest.fixture(scope="module")
+def revisited(model):
+    """15 unseen poses and 5 that were seen, visited four times each, one after the other."""
+    rng = np.random.default_rng(1)
+    pose = np.arange(80) // 4
+    q = rng.uniform(-2, 2, (20, 6))[pose]
+    p_ME = model.predict(q)[:, :3, 3] + NOISE * rng.normal(size=(80, 3))
+    measurements = Measurements(q, p_ME, pose_id=pose)
+    return KeptAway(measurements, Context.of(measurements), pose >= 5)
+
+
+class TestRepeatedVisits:
+    @staticmethod
+    def by_hand(model, trial):
+        """``(15,)`` mm."""
+        miss = (model.predict(trial.measurements.q_rad)[:, :3, 3] - trial.measurements.p_ME)[20:]
+        return np.array([1e3 * np.linalg.norm(miss[4 * k : 4 * k + 4].mean(axis=0)) for k in range(15)])
+
+    def test_all_means_are_that_of_the_barycentres(self, revisited, model, off):
+        gain = revisited.gain(off, model)
+        for found, robot in ((gain.before_mm, off), (gain.after_mm, model)):
+            mean = self.by_hand(robot, revisited).mean()
+            assert (found, revisited.mean(robot)) == pytest.approx((mean, mean))
+            assert revisited.accuracy(robot).position_mm.mean == pytest.approx(mean)
+
+    def test_the_interval_is_that_of_so_many_poses(self, revisited, model, off):
+        difference = self.by_hand(off, revisited) - self.by_hand(model, revisited)
+        interval = stats.t.interval(0.95, 14, difference.mean(), stats.sem(difference))
+        np.testing.assert_allclose(revisited.gain(off, model).ci95_mm, interval)
+
+
 def test_of_a_model_over_itself_nothing_is_gained(trial, model):
     gain = trial.gain(model, model)
     assert gain.before_mm == gain.after_mm

@@ -39,8 +39,21 @@ def test_lines_end_as_on_any_system(write, newline):
     assert list(table.lines) == [2, 3]
 
 
-def test_the_last_line_needs_no_newline(write):
+def test_the_last_line_needs_no_newline_but_a_missing_one_is_told(write, caplog):
     assert read_table(write("a\n1\n2")).numbers(["a"])[:, 0].tolist() == [1, 2]
+    (told,) = caplog.messages
+    assert told.endswith("table.csv, line 3: the last line has no line end: was the file cut off?")
+
+
+@pytest.mark.parametrize("text", ["a,b\n1,2\n", "a,b\r1,2\r", "a,b\r\n1,2\r\n", "a,b\n1,2\n  ", "a,b\n1,2\n,"])
+def test_where_the_last_row_is_whole_nothing_is_told(write, caplog, text):
+    assert not read_table(write(text)).ends_within_a_line
+    assert caplog.messages == []
+
+
+def test_a_caller_may_tell_it_by_itself(write, caplog):
+    assert read_table(write("a,b\n1,2"), tell_cut_off=False).ends_within_a_line
+    assert caplog.messages == []
 
 
 def test_a_byte_order_mark_is_no_part_of_the_first_name(write):

@@ -259,7 +259,7 @@ def _print(summary: dict[str, Any]) -> None:
         )
     doubtful = [each for each in summary["programs"] if each["status"] not in (*GOOD, "pending")]
     for each in doubtful[:SHOWN]:
-        why = each["message"] or f"targets that cannot be resolved without running the program: {each['unresolved']}"
+        why = each["message"] or f"targets that cannot be corrected: {each['unresolved']}"
         warn(f"{each['status']}: {each['program']}")
         out.print("  " + why.replace("\n", "\n  "))
     if len(doubtful) > SHOWN:

@@ -130,7 +130,8 @@ def tried(case: Case, calibration: Path, folder: Path) -> Outcome:
         code, said = -1, "does not come back"
     seconds = time.process_time() - begun
     fault = fault_of(code, said, program, output, seconds, {each.name for each in set(folder.iterdir()) - before})
-    output.unlink(missing_ok=True)
+    for left in (output, note_beside(output)):
+        left.unlink(missing_ok=True)
     words = OUTCOMES.get(code, "fails")
     if code == 2:
         words += ": " + said.partition("error: ")[2].partition("\n")[0].partition(": ")[2][:48]
@@ -173,9 +174,15 @@ def fault_of(code: int, said: str, program: Path, output: Path, seconds: float, 
         if said.count("error: ") != 1 or "Traceback" in said or program.name not in said:
             return "no clear message: " + said.strip()[:200]
         return None
-    if new != {output.name}:
+    with_note = {output.name, note_beside(output).name}  # of a toolpath that was changed
+    if new != {output.name} and not (output.suffix == ".csv" and new == with_note):
         return f"leaves {', '.join(sorted(new)) or 'nothing'}"
     return None
+
+
+def note_beside(output: Path) -> Path:
+    """Where the note of a corrected toolpath lies."""
+    return output.with_name(output.name + ".truepath.json")
 
 
 def table(outcomes: Sequence[Outcome]) -> str:

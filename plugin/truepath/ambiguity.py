@@ -14,6 +14,7 @@ from truepath.effects.steps import clock_of
 from truepath.motions import Moves
 from truepath.nameless import in_time, waves_of_a_joint
 from truepath.poe import ParameterName
+from truepath.report.words import joints_phrase
 from truepath.search import Search
 from truepath.term_set import TermSet
 
@@ -167,11 +168,12 @@ def hidden_behind_geometry(search: Search) -> Confusion | None:
     small = bool(np.all(np.ptp(search.seen.q_rad, axis=0) < SMALL_RAD))
     where = "in the small part of the workspace that was measured" if small else "with these poses and this noise"
     what = "Measure poses from the whole workspace." if small else "Measure more poses."
+    one = len(effects) == 1
     why = (
         f"{where}, {' and '.join(_plain(name) for name in effects)} of "
-        f"joint {', '.join(str(joint) for joint in joints)} looks like other link lengths and joint zeros: of a "
-        f"usual size it would move the probe by up to {worst:.2f} mm and could not be seen. The calibration holds "
-        f"where it was measured; elsewhere it may miss by as much. {what}"
+        f"{joints_phrase(joints)} look{'s' if one else ''} like other link lengths and joint zeros: of a usual size "
+        f"{'it' if one else 'they'} would move the probe by up to {worst:.2f} mm and could not be seen. The "
+        f"calibration holds where it was measured; elsewhere it may miss by as much. {what}"
     )
     return Confusion((*effects, GEOMETRY), why, tuple(term for term, _ in blurred), everywhere=True)
 

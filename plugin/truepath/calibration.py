@@ -165,6 +165,7 @@ def _read_json(path: Path) -> dict:
             "the calibration is cut off or no JSON",
             file=path,
             line=line,
+            expected="a calibration file, as truepath calibrate or diagnose writes it",
             found=getattr(error, "msg", str(error)),
         ) from None
     if not isinstance(content, dict):

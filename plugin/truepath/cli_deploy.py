@@ -64,18 +64,22 @@ def deploy(
         from truepath.deploying.deploy import DeployOptions, NotReady, prepare
         from truepath.deploying.load import bare_arm
         from truepath.deploying.printed import print_outcome, print_prepared
+        from truepath.deploying.sent_program import read_program, require_correction
         from truepath.pipeline import keep, require_place
         from truepath.rewriting.stated import stated_options
         from truepath.robot_link import RobotFault, RobotLink
 
-        if not (yes or dry_run or sys.stdin.isatty()):
-            raise InputError("nobody is there to ask whether the robot may move", expected="a terminal, or --yes")
         if stall_s is not None and not (math.isfinite(stall_s) and stall_s > 0):
             raise InputError("no such time", expected="--stall-s above 0", found=f"{stall_s:g}")
         if record is not None:
             keep(record, program, calibration)
             require_place(record)
+        sent = read_program(program)
         loaded = load_calibration(calibration).carrying(payload_kg)
+        if not uncorrected:
+            require_correction(sent, loaded)
+        if not (yes or dry_run or sys.stdin.isatty()):  # not before the files: a faulty one is the nearer trouble
+            raise InputError("nobody is there to ask whether the robot may move", expected="a terminal, or --yes")
         stated = stated_options(loaded, None, controller_kinematics, None, 0.0, "none", start_deg, tcp)
         options = DeployOptions(
             uncorrected,
@@ -145,7 +149,8 @@ def _say_dry(prepared: Prepared, json: bool) -> None:
     from truepath import console
 
     if json:
-        content = {"ready": True, "targets": len(prepared.rehearsal), "remarks": list(prepared.remarks)}
+        rehearsal, remarks = prepared.rehearsal, list(prepared.remarks)
+        content = {"ready": True, "targets": len(rehearsal), "via_points": rehearsal.through, "remarks": remarks}
         console.print_json({"schema": "truepath.deployment/1", **content})
     else:
         console.out.print("nothing was moved (--dry-run)")

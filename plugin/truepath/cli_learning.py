@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -51,11 +52,14 @@ def calibrate(
 ) -> None:
     """Learn the real robot from measured poses and write a calibration file."""
     from truepath import console
+    from truepath.asked_effects import became_of
+    from truepath.found_frames import found_frames
     from truepath.learn import learn
     from truepath.pipeline import keep, named_effects, naming, networks, require_place
 
     keep(output, data)
     require_place(output)
+    names = named_effects(effects)
     with networks(residual, device, seed, checkpoint, data, output) as options, console.progress("calibrating") as say:
         say("reading the robot")
         nominal = robot_named(robot)
@@ -63,17 +67,19 @@ def calibrate(
         measurements = _read(data, nominal, format, measured_in, probe)
         with naming(data):
             calibration, _, network = learn(
-                nominal, measurements, effects=named_effects(effects), network=options, source=robot, progress=say
+                nominal, measurements, effects=names, network=options, source=robot, progress=say
             )
+        asked = {} if names == "auto" else became_of(names, nominal, measurements, calibration.effects)
         calibration.save(output)
     if json:
         content = calibration.model_dump(by_alias=True, include={"robot": {"name", "model_sha256"}})
         content |= calibration.model_dump(include={"heldout", "noise", "data", "parameters", "effects"})
-        console.print_json({"calibration": str(output), "network": network, **content})
+        content["frames"] = [asdict(frame) for frame in found_frames(calibration)]
+        console.print_json({"calibration": str(output), "network": network, "asked": asked, **content})
         return
-    console.print_calibration(calibration)
+    console.print_calibration(calibration, asked)
     if network is not None:
-        console.out.print(f"neural residual: {network}")
+        console.print_network(calibration, network)
     if parameters:
         console.print_parameters(calibration)
     console.out.print(f"written to {output}")
@@ -95,9 +101,10 @@ def diagnose(
     """Show what the simulation gets wrong, name the cause, extend the model, measure the gain."""
     from truepath import console
     from truepath.diagnose import diagnose as find_causes
+    from truepath.measure_next import OTHER_NAME, beside
     from truepath.pipeline import naming, networks, require_folder, write_diagnosis
 
-    results = [folder / name for name in (*RESULTS, "poses.csv")]
+    results = [folder / name for name in (*RESULTS, "poses.csv", f"{OTHER_NAME}.csv")]
     with networks(residual, device, seed, checkpoint, data, *results) as options, console.progress("diagnosing") as say:
         say("reading the robot")
         nominal = robot_named(robot)
@@ -106,6 +113,7 @@ def diagnose(
         with naming(data):
             require_folder(folder, [folder / name for name in RESULTS], data)
             diagnosis = find_causes(nominal, measurements, spec=robot, source=robot, network=options, progress=say)
+        diagnosis = beside(diagnosis, folder, data)
         say("writing the report")
         files = write_diagnosis(diagnosis, folder, data)
     if json:
@@ -140,13 +148,19 @@ def validate(
         measurements = read_measurements(data, model.robot, format)
         if refit_frames is not None:
             with naming(refit_frames):
-                model = validation.refit_frames(model, read_measurements(refit_frames, model.robot, format))
+                few = read_measurements(refit_frames, model.robot, format)
+                validation.require_other_poses(few, measurements)
+                model = validation.refit_frames(model, few)
         result = validation.validate(model, measurements)
     if json:
         console.print_json(result.to_dict())
     else:
         console.print_accuracy(f"{result.poses} poses of {data}", result.nominal, result.calibrated)
     position = result.calibrated.position_mm
+    if measurements.sha256 == loaded.data.sha256:
+        (console.complain if json else console.warn)(
+            f"{calibration} was made from these very poses: this is how well it fits them, no proof for others"
+        )
     if refit_frames is None and loaded.heldout and position.mean > MOVED * loaded.heldout.calibrated.position_mm.mean:
         console.complain(
             f"far worse than the {loaded.heldout.calibrated.position_mm.mean:.3f} mm on held-out poses: if tracker, "

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from truepath.cli_options import Json, Output
 from truepath.errors import InputError
 
-if TYPE_CHECKING:
-    pass
+
+def _two_files(stated: tuple[Path, Path] | None) -> tuple[Path, Path] | None:
+    """Refuses an option that was taken for the second file, before it is missed."""
+    if stated is not None and str(stated[1]).startswith("-"):
+        raise InputError(
+            "--improve needs two files",
+            expected="--improve calibration.json data.csv",
+            found=f"{stated[0]}, then {stated[1]}",
+        )
+    return stated
 
 
 def plan(
@@ -55,7 +63,10 @@ def plan(
     improve: Annotated[
         tuple[Path, Path] | None,
         typer.Option(
-            help="calibration.json data.csv: poses for what is still uncertain or ambiguous", show_default=False
+            help="both files, one after the other: poses for what is still uncertain or ambiguous",
+            metavar="CALIBRATION.JSON DATA.CSV",
+            callback=_two_files,
+            show_default=False,
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of all chance: the same seed, the same plan")] = 0,

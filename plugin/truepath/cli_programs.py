@@ -48,8 +48,9 @@ def correct(
     """Rewrite a program so that the real robot goes where the program means it to."""
     from truepath import console, console_programs
     from truepath.calibration import load_calibration
-    from truepath.files import write_atomically
     from truepath.pipeline import keep, require_place
+    from truepath.rewriting.note import note_of
+    from truepath.rewriting.open import require_same_format
     from truepath.rewriting.rewrite import rewrite_program
     from truepath.rewriting.stated import stated_options
 
@@ -58,6 +59,7 @@ def correct(
     if output is not None:
         keep(output, path, calibration)
         require_place(output)
+        require_same_format(path, output)
     with console.progress("correcting") as say:
         say("reading the calibration")
         loaded = load_calibration(calibration, None if robot is None else robot_named(robot)).carrying(payload_kg)
@@ -66,13 +68,15 @@ def correct(
         )
         rewritten = rewrite_program(path, loaded, options, say=say)
         if output is not None and not dry_run:
-            write_atomically(output, rewritten.content)
+            rewritten.write(output)
     written = None if dry_run or output is None else str(output)
+    note = None if written is None or rewritten.note is None else str(note_of(written))
     if json:
-        console.print_json({"output": written, **rewritten.summary()})
+        console.print_json({"output": written, "note": note, **rewritten.summary()})
     else:
         console_programs.print_rewritten(rewritten)
-        console.out.print("nothing is written (--dry-run)" if written is None else f"written to {written}")
+        beside = "" if note is None else f", with its note {Path(note).name}"
+        console.out.print("nothing is written (--dry-run)" if written is None else f"written to {written}{beside}")
     if rewritten.unresolved and not allow_partial:
         raise typer.Exit(1)
 
@@ -82,10 +86,17 @@ def preview(
     calibration: CalibrationFile,
     output: Output,
     robot: Annotated[str | None, typer.Option("--robot", help="model to draw; default: the calibration's own")] = None,
-    magnification: Annotated[float, typer.Option(help="by how much errors are drawn larger than they are")] = 50.0,
+    magnification: Annotated[
+        str,
+        typer.Option(
+            metavar="FACTOR|auto",
+            help="by how much errors are drawn larger than they are; auto: so that they are well visible",
+        ),
+    ] = "50",
     payload_kg: PayloadKg = None,
     max_correction_mm: MaxCorrection = 5.0,
     controller_kinematics: ControllerKinematics = "nominal",
+    cell: CellSpec = None,
     start_deg: StartDeg = None,
     tcp: Tcp = None,
 ) -> None:
@@ -93,29 +104,34 @@ def preview(
     from truepath import console, console_programs
     from truepath.calibration import load_calibration
     from truepath.controller import controller_of
-    from truepath.pipeline import keep
+    from truepath.pipeline import keep, require_place
     from truepath.preview import write_program_preview
+    from truepath.preview.toolpaths import stated_magnification
     from truepath.rewriting.open import SCRIPTS
     from truepath.rewriting.rewrite import rewrite_program
     from truepath.rewriting.stated import stated_options
 
     keep(output, path, calibration)
+    require_place(output)
+    drawn_larger = stated_magnification(magnification)
     with console.progress("drawing") as say:
         loaded = load_calibration(calibration).carrying(payload_kg)
-        options = stated_options(loaded, None, controller_kinematics, None, max_correction_mm, "none", start_deg, tcp)
+        options = stated_options(loaded, None, controller_kinematics, None, max_correction_mm, cell, start_deg, tcp)
         rewritten = rewrite_program(path, loaded, options, say=say)
-        write_program_preview(
+        page = write_program_preview(
             output,
             loaded,
             rewritten,
             controller_of(loaded.model.robot, controller_kinematics),
             robot_source=robot or loaded.robot.source,
-            magnification=magnification,
+            magnification=drawn_larger,
             title=path.name,
             text=path.read_text("utf-8", "replace") if path.suffix.lower() in SCRIPTS else None,
         )
     console_programs.print_rewritten(rewritten)
-    console.out.print(f"open {output} in a browser")
+    tell = console.warn if page.expected.known_mm is None else console.out.print
+    tell(f"to be expected on the robot with the correction: {page.expected.source}")
+    console.out.print(f"errors are drawn {page.magnification:g} times larger; open {output} in a browser")
 
 
 def export(

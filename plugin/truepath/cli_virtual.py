@@ -35,9 +35,10 @@ def simulate(
 ) -> None:
     """Make measured data of a virtual robot with hidden errors; the truth is computed by Drake."""
     from truepath import console
-    from truepath.pipeline import simulate_campaign
+    from truepath.pipeline import require_place, simulate_campaign
     from truepath.virtual.simulate import Campaign
 
+    require_place(output)
     names = [name.strip() for text in hide or () for name in text.split(",")]
     campaign = Campaign(poses, noise_mm, orientation_noise_mrad, repeats, tracker, poses_seed)
     with console.progress("simulating"):

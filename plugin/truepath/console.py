@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from truepath.calibration_residual import ResidualPart
     from truepath.diagnosis import Diagnosis
     from truepath.iso9283 import Accuracy
+
+CROSS_VALIDATED = "these errors are cross-validated, to decide by; those in the table are of the poses kept away"
 
 # Soft wrap: a path or a sentence is one line wherever it goes; terminals break lines by themselves.
 out = Console(highlight=False, markup=False, soft_wrap=True)
@@ -92,14 +94,20 @@ def print_accuracy(
     out.print(table)
 
 
-def print_calibration(calibration: Calibration) -> None:
-    """What a person wants to know after calibrating."""
+def print_calibration(calibration: Calibration, asked: Mapping[str, str] | None = None) -> None:
+    """What a person wants to know after calibrating.
+
+    Args:
+        calibration: what was found.
+        asked: what became of each effect that was asked for by name, as ``asked_effects.became_of`` has it.
+    """
     data, noise = calibration.data, calibration.noise
     kind = "6D" if data.has_orientation else "3D"
     out.print(f"{calibration.robot.name} calibrated on {data.poses} poses ({kind}) of {data.file}", style="bold")
     if calibration.heldout is not None:
         held_out = calibration.heldout
-        title = f"on {held_out.poses} poses that the fit had not seen"
+        how = "cross-validated" if "cross-validation" in held_out.method else "kept away"
+        title = f"on {held_out.poses} poses that the fit had not seen ({how})"
         print_accuracy(title, held_out.nominal, held_out.calibrated, held_out.kinematic, held_out.named)
     else:
         warn("too few poses to hold any back: the accuracy on new poses is not known")
@@ -107,11 +115,8 @@ def print_calibration(calibration: Calibration) -> None:
     if noise.orientation_mrad is not None:
         spread += f", {noise.orientation_mrad:.4f} mrad per axis"
     out.print(f"left unexplained (noise and what the model lacks): {spread}")
-    for name in dict.fromkeys(effect.name for effect in calibration.effects):
-        found = [effect for effect in calibration.effects if effect.name == name]
-        joints = ", ".join(str(effect.joint) for effect in found if effect.joint is not None)
-        place = f" on joint {joints}" if joints else ""
-        out.print(f"{name}{place}: {found[0].cause}; {found[0].remedy}")
+    _print_frames(calibration)
+    _print_effects(calibration, asked or {})
     if calibration.residual is not None:
         out.print(f"networks: {_networks(calibration.residual)}")
     if data.outlier_lines:
@@ -126,7 +131,9 @@ def print_calibration(calibration: Calibration) -> None:
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """What a person wants to know after a diagnosis; the rest is in the report."""
     out.print(diagnosis.verdict, style="bold")
-    table = Table(title="error on poses kept away, mm", title_justify="left", box=box.SIMPLE_HEAD)
+    data = diagnosis.to_dict()["data"]
+    title = f"error on {data['unseen_poses']} poses kept away, mm"
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for name, side in (("model", "left"), ("mean", "right"), ("p95", "right"), ("max", "right")):
         table.add_column(name, justify=side)  # type: ignore[arg-type]
     for stage in diagnosis.stages:
@@ -148,6 +155,9 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
     if diagnosis.network is not None:
         out.print("neural residual", style="bold")
         out.print(f"  {diagnosis.network.why}")
+        if diagnosis.network.model is not None:
+            out.print(f"  {CROSS_VALIDATED}")
+    _print_frames(diagnosis.calibration)
     for item in diagnosis.ambiguous:
         warn(f"cannot be told apart: {', '.join(item.effects)}")
         out.print(f"  {item.why}" + (f"\n  poses that would tell: {item.measure_next}" if item.measure_next else ""))
@@ -155,9 +165,44 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
         warn(f"not explained: {hint}")
     for blind in diagnosis.not_testable:
         out.print(f"not testable: {blind.effect.replace('_', ' ')} ({blind.why})")
-    rows = [str(row) for row in diagnosis.to_dict()["data"]["outliers"]]
+    rows = [str(row) for row in data["outliers"]]
     if rows:
         warn(f"{len(rows)} rows left out as gross errors: {', '.join(rows[:12])}{' ...' if len(rows) > 12 else ''}")
+
+
+def print_network(calibration: Calibration, why: str) -> None:
+    """What became of networks that were asked for."""
+    out.print(f"neural residual: {why}")
+    if calibration.residual is not None:
+        out.print(f"  {CROSS_VALIDATED}")
+
+
+def _print_frames(calibration: Calibration) -> None:
+    from truepath.found_frames import found_frames
+
+    for frame in found_frames(calibration):
+        out.print(frame.line)
+        if frame.warning is not None:
+            warn(f"warning: {frame.warning}")
+
+
+def _print_effects(calibration: Calibration, asked: Mapping[str, str]) -> None:
+    from truepath.report.words import joints_phrase
+
+    for name in dict.fromkeys(effect.name for effect in calibration.effects):
+        found = [effect for effect in calibration.effects if effect.name == name]
+        joints = [effect.joint for effect in found if effect.joint is not None]
+        place = (f" on {joints_phrase(joints)}" if joints else "") + (" (as asked)" if asked else "")
+        out.print(f"{name}{place}: {found[0].cause}; {found[0].remedy}")
+    if asked:
+        from truepath.asked_effects import IN_MODEL, ONLY_THESE, STAND_IN
+
+        out.print("effects asked for:")
+        for name, what in asked.items():
+            out.print(f"  {name}: {what}")
+        out.print(f"  {ONLY_THESE}")
+        if IN_MODEL in asked.values():
+            warn(f"  {STAND_IN}")
 
 
 def print_parameters(calibration: Calibration) -> None:

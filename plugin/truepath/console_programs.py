@@ -34,12 +34,12 @@ def print_rewritten(program: RewrittenProgram) -> None:
     print_networks(correction)
     cell = "in no cell (--cell)" if program.cell is None else f"in {program.cell}"
     out.print(f"looked for collisions {cell}")
+    if program.note is not None:
+        out.print(f"{program.file} is taken for the original: a CSV without its note cannot be recognised as corrected")
     for warning in program.warnings:
         warn(warning if warning.startswith("warning: ") else f"warning: {warning}")
     if program.unresolved:
-        warn(
-            f"left as they are, because they cannot be resolved without running the program: {len(program.unresolved)}"
-        )
+        warn(f"left as they are, because they cannot be corrected: {len(program.unresolved)}")
         for each in program.unresolved[:SHOWN]:
             out.print(f"  line {each.line}: {each.text}\n    {each.why}")
         if len(program.unresolved) > SHOWN:

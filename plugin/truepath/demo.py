@@ -80,7 +80,7 @@ def run_demo(folder: Path, seed: int, say: Callable[[str], None]) -> DemoResult:
     say("a welding path is corrected")
     path = plants.models_dir() / "ur5" / "weld_path.csv"
     corrected = rewrite_program(path, calibration)
-    write_atomically(folder / "weld_path.corrected.csv", corrected.content)
+    corrected.write(folder / "weld_path.corrected.csv")
     assert nominal.X_FR is not None
     wanted = (nominal.X_WB @ nominal_flange_poses(nominal, corrected.plan.q_rad) @ nominal.X_FR)[:, :3, 3]
     before, after = (

@@ -7,7 +7,9 @@ from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
+import truepath
 from truepath import calibration_parts as artefact
+from truepath.barycentre import pose_count
 from truepath.calibrate import BARELY_SEEN, Fit
 from truepath.calibration import Calibration
 from truepath.calibration_parts import HeldOutPart
@@ -84,7 +86,7 @@ def describe(
         data=artefact.DataPart(
             file=measurements.source,
             sha256=measurements.sha256,
-            poses=len(measurements),
+            poses=pose_count(measurements.groups()),
             has_orientation=measurements.has_orientation,
             payload_kg=model.payload_kg,
             outlier_lines=measurements.line[fit.outlier].tolist(),
@@ -101,8 +103,9 @@ def _frame(X: Array, X_nominal: Array, given: bool) -> artefact.FramePart:
 
 
 def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version()}
-    for package in ("truepath", "drake", "casadi", "numpy", "scipy", "torch"):
+    # What pip knows of truepath is that of the day when a checkout was installed.
+    versions = {"python": platform.python_version(), "truepath": truepath.__version__}
+    for package in ("drake", "casadi", "numpy", "scipy", "torch"):
         try:
             versions[package] = version(package)
         except PackageNotFoundError:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from truepath.barycentre import pose_count
 from truepath.calibrate import Fit
 from truepath.calibration import Calibration
 from truepath.files import write_atomically
@@ -105,7 +106,7 @@ class Unexplained:
         structured: whether it follows a pattern that no named cause carries.
         p_value: of there being none.
         heldout_mm: mean error on unseen poses.
-        noise_floor_mm: mean error that noise alone makes, from repeats or from neighbours.
+        noise_floor_mm: mean error that noise alone makes there, from repeats or from neighbours.
         floor_from: ``repeats`` or ``neighbours``.
         hints: what the pattern goes with, in plain words.
     """
@@ -166,14 +167,16 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         rows = [row + 1 for row, left_out in enumerate(self.outlier) if left_out]
+        groups = self.measurements.groups()
         return {
             "schema": SCHEMA,
             "verdict": self.verdict,
             "data": {
                 "file": self.measurements.source,
                 "sha256": self.measurements.sha256,
-                "poses": len(self.measurements),
-                "unseen_poses": int(self.unseen.sum()),
+                "rows": len(groups),
+                "poses": pose_count(groups),
+                "unseen_poses": pose_count(groups[self.unseen]),
                 "outliers": rows,
             },
             "stages": [_stage(stage) for stage in self.stages],

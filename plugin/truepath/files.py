@@ -24,7 +24,8 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     try:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     except OSError as error:
-        raise InputError("cannot write here", file=path, found=error.strerror) from None
+        expected = "a file in a folder that is there and can be written to"
+        raise InputError("cannot write here", file=path, expected=expected, found=error.strerror) from None
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from truepath import lie
+from truepath.barycentre import barycentres
 from truepath.lie import Array
 
 MAX_PAIRS = 500_000
@@ -56,7 +57,7 @@ def accuracy(X_predicted: Array, p_measured: Array, R_measured: Array | None, gr
         groups: ``(N,)`` group of each row, from 0; rows of one group are visits of one pose and are
             replaced by their barycentre.
     """
-    attained, commanded = _barycentres(p_measured, groups), _barycentres(X_predicted[:, :3, 3], groups)
+    attained, commanded = barycentres(p_measured, groups), barycentres(X_predicted[:, :3, 3], groups)
     position = np.linalg.norm(attained - commanded, axis=1)
     first, second = _pairs(len(attained))
     distance = np.abs(
@@ -67,18 +68,13 @@ def accuracy(X_predicted: Array, p_measured: Array, R_measured: Array | None, gr
     if R_measured is not None:
         turn = R_measured @ np.swapaxes(X_predicted[:, :3, :3], 1, 2)
         # The mean of small rotation vectors is the mean rotation to second order.
-        mean_turn = _barycentres(lie.rotation_vector(turn), groups)
+        mean_turn = barycentres(lie.rotation_vector(turn), groups)
         orientation = ErrorStatistics.of(np.linalg.norm(mean_turn, axis=1) * 1e3)
     return Accuracy(
         ErrorStatistics.of(position * 1e3),
         ErrorStatistics.of(distance * 1e3) if len(distance) else None,
         orientation,
     )
-
-
-def _barycentres(values: Array, groups: Array) -> Array:
-    count = np.bincount(groups)
-    return np.stack([np.bincount(groups, values[:, k]) for k in range(values.shape[1])], axis=1) / count[:, None]
 
 
 def _pairs(count: int) -> tuple[Array, Array]:

@@ -1,10 +1,11 @@
-"""Poses that were kept away from a fit, and how well models do there."""
+"""Poses that were kept away from a fit, and how well models do there; repeated visits of a pose count as one."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import special
 
+from truepath.barycentre import barycentres
 from truepath.context import Context
 from truepath.diagnosis import Gain
 from truepath.iso9283 import Accuracy, accuracy
@@ -35,16 +36,17 @@ class KeptAway:
         return self._accuracy(model.predict_nominal(self.context.subset(self.unseen)))
 
     def errors_mm(self, model: CalibratedModel) -> Array:
-        """``(k,)`` on the unseen poses."""
-        error = model.predict(self.context.subset(self.unseen))[:, :3, 3] - self.measurements.p_ME[self.unseen]
-        return 1e3 * np.linalg.norm(error, axis=1)
+        """``(k,)`` of the k unseen poses, each at the barycentre of its visits."""
+        part = self.measurements.subset(self.unseen)
+        error = model.predict(self.context.subset(self.unseen))[:, :3, 3] - part.p_ME
+        return 1e3 * np.linalg.norm(barycentres(error, part.groups()), axis=1)
 
     def mean(self, model: CalibratedModel) -> float:
-        """Mean error on the unseen poses, mm."""
+        """Mean error on the unseen poses, mm: that of ``accuracy``."""
         return float(self.errors_mm(model).mean())
 
     def gain(self, without: CalibratedModel, model: CalibratedModel) -> Gain:
-        """Of a model over another, with Student's interval of the paired difference."""
+        """Of a model over another, with Student's interval of the paired difference: k poses, however often visited."""
         before, after = self.errors_mm(without), self.errors_mm(model)
         difference = before - after
         mean, k = float(difference.mean()), len(difference)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from truepath.barycentre import pose_count
 from truepath.calibrate import Fit, calibrate
 from truepath.calibration import Calibration
 from truepath.calibration_parts import HeldOutPart
@@ -118,7 +119,7 @@ def cross_validate(
     accuracies = {name: accuracy(X, measurements.p_ME, measurements.R_ME, groups) for name, X in X_ME.items()}
     return held_out(
         f"{FOLDS}-fold cross-validation, repeated poses together, outliers left out",
-        len(measurements),
+        pose_count(groups),
         accuracies["nominal"],
         accuracies.get("kinematic"),
         accuracies["calibrated"],
@@ -143,7 +144,7 @@ def on_kept_away(
         without_networks = trial.accuracy(named) if named.effects else None
     return held_out(
         how,
-        int(trial.unseen.sum()),
+        pose_count(trial.measurements.groups()[trial.unseen]),
         trial.nominal_accuracy(named),
         trial.accuracy(kinematic),
         trial.accuracy(named if final is None else final),

@@ -31,8 +31,11 @@ def models_dir() -> Path:
     return installed if installed.is_dir() else Path(__file__).parents[2] / "models"
 
 
-def resolve(spec: str | Path) -> Path:
+def resolve(spec: str | Path, called: str = "robot") -> Path:
     """The file behind a built-in name or a path.
+
+    Args:
+        called: what the message calls it.
 
     Raises:
         InputError: neither a built-in name nor an existing ``.urdf`` or ``.dmd.yaml`` file.
@@ -52,7 +55,7 @@ def resolve(spec: str | Path) -> Path:
         exists = is_file = False
     if not is_file or not path.name.endswith((".urdf", ".dmd.yaml")):
         raise InputError(
-            f"no robot {str(spec)!r}",
+            f"no {called} {str(spec)!r}",
             expected=f"a built-in name ({', '.join(BUILT_IN)}) or an existing .urdf or .dmd.yaml file",
             found="a file of another kind" if exists else "no such file",
         )

@@ -1,6 +1,7 @@
 """The stamp: a comment in a corrected program by which truepath knows its own work, and refuses to repeat it.
 
-One line of the program, nothing but a comment. Behind the comment sign, which is the format's own:
+One line of the program, nothing but a comment; for formats without comments see ``rewriting.note``. Behind the comment
+sign, which is the format's own:
 
     truepath-corrected version=0.6.0 program-sha256=<64 hex> calibration-sha256=<64 hex> body-sha256=<64 hex>
     date=2026-11-22
@@ -119,8 +120,12 @@ def refuse_if_stamped(text: str, file: str | Path, comment: str) -> None:
     found = find_stamp(text, file, comment)
     if found is None:
         return
-    stamp, line = found
-    raise InputError(
+    raise already_corrected(found[0], file, found[1])
+
+
+def already_corrected(stamp: Stamp, file: str | Path, line: int | None = None) -> InputError:
+    """The refusal of a program that was corrected, whatever says so."""
+    return InputError(
         "truepath has corrected this program already",
         file=file,
         line=line,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import difflib
 import io
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from truepath.errors import InputError
 from truepath.lie import Array
 
 MAX_BYTES = 1 << 30
+CUT_OFF = "the last line has no line end: was the file cut off?"
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,12 @@ class Table:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def ends_within_a_line(self) -> bool:
+        """Whether a line end is missing behind the last row; then a number may have lost its last digits."""
+        last = self.raw[max(self.raw.rfind(b"\n"), self.raw.rfind(b"\r")) + 1 :]
+        return bool(last.strip(b" \t,;"))
 
     def require(self, names: Sequence[str]) -> None:
         """Raises InputError for the first column that is not there, naming the one that looks like it."""
@@ -116,8 +125,13 @@ class Table:
         return None if np.isfinite(value) else "an infinite number"
 
 
-def read_table(path: str | Path, *, delimiter: str = ",", decimal: str = ".") -> Table:
+def read_table(path: str | Path, *, delimiter: str = ",", decimal: str = ".", tell_cut_off: bool = True) -> Table:
     """Reads a UTF-8 text table with one header line; blank lines at the end are ignored.
+
+    Args:
+        path: of the file.
+        delimiter, decimal: separators.
+        tell_cut_off: log a warning where the last line has no line end; False: the caller tells it by itself.
 
     Raises:
         InputError: file missing, too large, not UTF-8, empty, doubled column, ragged row, blank line inside.
@@ -170,7 +184,10 @@ def read_table(path: str | Path, *, delimiter: str = ",", decimal: str = ".") ->
             )
     if len(rows) == 1:
         raise InputError("the file has a header but no rows", file=path)
-    return Table(path, header, rows[1:], np.array(lines[1:]), raw, decimal)
+    table = Table(path, header, rows[1:], np.array(lines[1:]), raw, decimal)
+    if tell_cut_off and table.ends_within_a_line:
+        log.warning("warning: %s, line %d: %s", path, lines[-1], CUT_OFF)
+    return table
 
 
 def _read_bytes(path: Path) -> bytes:

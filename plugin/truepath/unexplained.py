@@ -29,6 +29,9 @@ def unexplained(trial: UnseenPoses, evidence: Evidence) -> Unexplained:
     # What looked like a named cause and was none is a pattern all the same.
     p_forms = [evidence.p_values[name] for name in (*(t.effect for t in evidence.nameless), *evidence.unproved)]
     floor, source = noise_floor_mm(looked_at, residual)
+    # The unseen poses are judged at the barycentres of their visits, which scatter less.
+    visits = np.unique(trial.measurements.groups()[trial.unseen], return_counts=True)[1]
+    floor *= float(np.mean(visits**-0.5))
     if source == "neighbours":  # a fit makes residuals smaller than the noise is
         readings = residual.size
         floor *= float(np.sqrt(readings / max(readings - len(fit.covariance) - len(fit.values), 1)))

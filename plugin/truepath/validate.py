@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truepath import frames
+from truepath.barycentre import pose_count
 from truepath.context import Context
-from truepath.errors import CalibrationError
+from truepath.errors import CalibrationError, InputError
 from truepath.iso9283 import Accuracy, accuracy
 from truepath.measurements import Measurements
 from truepath.model import CalibratedModel, nominal_flange_poses
@@ -46,7 +47,24 @@ def validate(model: CalibratedModel, measurements: Measurements) -> Validation:
             model.predict(context),
         )
     )
-    return Validation(int(groups.max()) + 1, nominal, calibrated)
+    return Validation(pose_count(groups), nominal, calibrated)
+
+
+def require_other_poses(few: Measurements, measurements: Measurements) -> None:
+    """Refuses to find frames from readings on which they are validated: what was fitted to them proves nothing there.
+
+    Raises:
+        InputError: some readings are in both.
+    """
+    both = [np.unique(np.concatenate([part.q_rad, part.p_ME], axis=1), axis=0) for part in (few, measurements)]
+    shared = len(both[0]) + len(both[1]) - len(np.unique(np.concatenate(both), axis=0))
+    if shared:
+        raise InputError(
+            "the frames cannot be found again from poses on which they are validated",
+            file=few.source,
+            expected="other poses",
+            found=f"{shared} of {len(both[0])} readings are in {measurements.source} too",
+        )
 
 
 def refit_frames(model: CalibratedModel, measurements: Measurements) -> CalibratedModel:

@@ -101,9 +101,19 @@ def test_it_keeps_report_programs_and_previews(runner, tmp_path):
     assert (tmp_path / "corrected" / "batch.html").is_file()
     assert (tmp_path / "corrected" / "cell one" / "a.script").is_file()
     assert (tmp_path / "previews" / "cell one" / "a.script.html").is_file()
-    assert runner("Check bounds", MAX_ERROR_AFTER_MM="0") == {"Check bounds": 1}
+    assert runner("Check bounds", MAX_HELDOUT_ERROR_MM="0.01") == {"Check bounds": 1}
     assert runner("Correct all programs", MAX_CORRECTION_MM="0.01") == {"Correct all programs": 1}
     assert runner("Correct all programs", ROBOT="ur10") == {"Correct all programs": 2}
+
+
+def test_programs_outside_the_calibrated_region_turn_it_red(runner, tmp_path, capfd):
+    """There nobody knows what to expect, however exactly the joints are solved."""
+    (tmp_path / "programs").mkdir()
+    turned = "def far():\n  movej([6.2, -1.6, 1.7, -1.65, -1.55, 0.1])\nend\n"
+    (tmp_path / "programs" / "far.script").write_text(turned)
+    assert runner("Correct all programs", CELL="none") == {"Correct all programs": 0}
+    assert runner("Check bounds") == {"Check bounds": 1}
+    assert "100% of 1 targets" in capfd.readouterr().out
 
 
 def test_a_program_that_is_refused_turns_it_red(runner, tmp_path, capfd):

@@ -19,6 +19,7 @@ from truepath.batch.settings import Settings
 from truepath.batch.summary import summarise
 from truepath.batch.tasks import make_tasks, wishes_in_folder
 from truepath.files import write_atomically
+from truepath.rewriting import note
 
 pytest.importorskip("distributed", reason="needs the extra 'batch'")
 
@@ -39,7 +40,8 @@ def written(monkeypatch):
         count[Path(path).name] += 1
         write_atomically(path, content)
 
-    monkeypatch.setattr(results, "write_atomically", counting)
+    for module in (results, note):  # a program is written together with the note that it may need
+        monkeypatch.setattr(module, "write_atomically", counting)
     return count
 
 

@@ -22,7 +22,7 @@ def test_every_program_is_corrected_as_the_command_does_it(batch, programs, cali
     assert done.code == 0, done.err
     written = contents(done.folder)
     names = {"a.script", "cell/b.script", "cell/deep/c.script", "path.csv"}
-    assert set(written) == names | {f"{name}.json" for name in names}
+    assert set(written) == names | {f"{name}.json" for name in names} | {"path.csv.truepath.json"}
     for name in names:
         alone = tmp_path / f"alone{name[-7:].replace('/', '')}"
         assert truepath("correct", folder / name, "-c", calibration, "-o", alone).code == 0
@@ -30,6 +30,20 @@ def test_every_program_is_corrected_as_the_command_does_it(batch, programs, cali
     totals = done.summary["totals"]
     assert (totals["programs"], totals["corrected"], totals["targets"]) == (4, 4, 10)
     assert done.summary["complete"] is True
+
+
+def test_a_toolpath_that_is_corrected_already_is_refused(batch, programs, calibration):
+    folder = programs()
+    folder.mkdir(exist_ok=True)
+    (folder / "path.csv").write_text("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad\n0,-1.6,1.7,-1.6,-1.5,0.1\n")
+    first = batch(folder, "-c", calibration)
+    first.folder.rename(folder.with_name("corrected_once"))
+    again = batch(folder.with_name("corrected_once"), "-c", calibration)
+    assert again.code == 1
+    (entry,) = again.summary["programs"]
+    assert entry["status"] == "refused"
+    assert "path.csv: truepath has corrected this program already" in entry["message"]
+    assert not (again.folder / "path.csv").exists()
 
 
 def test_a_result_says_how_it_came_about(batch, programs, calibration):

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+import truepath
 from deviating_arm import EFFECTS, described, measured
 from signed_content import changed, signed
 from truepath.calibration import load_calibration
@@ -72,6 +73,7 @@ def test_the_file_says_where_it_comes_from(text):
     content = json.loads(text)
     assert content["schema"] == "truepath.calibration/1"
     assert {"python", "truepath", "drake", "numpy"} <= set(content["software"])
+    assert content["software"]["truepath"] == truepath.__version__  # not what was installed when a checkout was new
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", content["created_utc"])
     assert content["data"]["poses"] == 75
     assert content["data"]["outlier_lines"] == [9, 32]

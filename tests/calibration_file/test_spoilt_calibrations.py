@@ -66,7 +66,9 @@ def test_a_file_that_is_not_utf8_is_refused(refusal, content):
 
 @pytest.mark.parametrize("content", [b"", b"\n", b"\xef\xbb\xbf{}", b"{", b"{'schema': 1}", b"\x00" * 50])
 def test_what_is_no_json_is_refused(refusal, content):
-    assert refusal(content).problem == "the calibration is cut off or no JSON"
+    refused = refusal(content)
+    assert refused.problem == "the calibration is cut off or no JSON"
+    assert "truepath calibrate" in refused.expected
 
 
 @pytest.mark.parametrize("opening", ["[", '{"schema":'])

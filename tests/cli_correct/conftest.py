@@ -41,12 +41,12 @@ def calibration(tmp_path_factory):
 
 @pytest.fixture
 def correct(monkeypatch, capsys, calibration, tmp_path):
-    """Runs the command on a program text; its output is ``out.script``."""
+    """Runs the command on a program text; its output is ``out.script``, of a toolpath ``out.csv``."""
 
     def correct(text, *options, name="weld.script", output=True):
         program = tmp_path / name
         program.write_bytes(text if isinstance(text, bytes) else text.encode())
-        target = ("-o", tmp_path / "out.script") if output else ()
+        target = ("-o", tmp_path / ("out.csv" if name.endswith(".csv") else "out.script")) if output else ()
         return run(monkeypatch, capsys, "correct", program, "-c", calibration, *target, *options)
 
     return correct

@@ -48,9 +48,15 @@ def test_options_that_make_no_sense(correct, weld, output, options, words):
         ("def p():\n  movel(p[0.1,,0.2])\nend\n", ("line 2, column '15'", "this is not understood")),
         ("def p():\n  sync()\n", ("line 1", "'def' is not closed")),
         ("sync()\nend\n", ("line 2", "an 'end' too many")),
+        ("", ("weld.script: the program is empty",)),
+        ("# no more than a comment\n\n", ("weld.script: the program is empty", "a statement at least")),
         (b"def p():\n\x00\nend\n", ("line 2", "a zero byte")),
         ("def p():\n  movej([9, 0, 0, 0, 0, 0])\nend\n", ("line 2", "passes a joint limit")),
         ("def p():\n  movej([0,-1.6,1.7,-1.6,-1.5,0])\n  movel(p[9,0,0,0,0,0])\nend\n", ("line 3", "out of reach")),
+        (
+            "def p():\n  movej([0,-1.6,1.7,-1.6,-1.5,0])\n" + "  movel(p[1.2,0,0.3,0,0,0])\n" * 4 + "end\n",
+            ("line 3", "out of reach", "so are most targets: is it a program for another robot?"),
+        ),
         ("def p():\n  movel(p[1e9,0,0,0,0,0])\nend\n", ("line 2", "far from any robot")),
     ],
 )
@@ -61,6 +67,25 @@ def test_bad_programs_are_refused_with_their_line(correct, output, text, words):
 
 def test_an_ending_that_nobody_knows(correct, weld):
     assert is_refused(correct(weld, name="weld.urp"), "unknown kind of program", ".script")
+
+
+def test_one_target_out_of_reach_is_not_taken_for_another_robot(correct):
+    near = "".join(f"  movel(p[-0.4,{y},0.3,0,3.1,0])\n" for y in (0.10, 0.12, 0.14))
+    text = f"def p():\n  movej([0,-1.6,1.7,-1.6,-1.5,0])\n  movel(p[1.2,0,0.3,0,0,0])\n{near}end\n"
+    outcome = correct(text)
+    assert is_refused(outcome, "line 3", "out of reach")
+    assert "another robot" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("name", "output", "expected"),
+    [("weld.script", "out.CSV", "a name ending in .script"), ("path.csv", "out.urscript", "a name ending in .csv")],
+)
+def test_an_output_named_as_another_format(monkeypatch, capsys, calibration, tmp_path, name, output, expected):
+    (tmp_path / name).write_text("sync()\n")
+    outcome = run(monkeypatch, capsys, "correct", tmp_path / name, "-c", calibration, "-o", tmp_path / output)
+    assert is_refused(outcome, output, "named as a program of another format", expected)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_a_missing_program(monkeypatch, capsys, calibration, tmp_path):

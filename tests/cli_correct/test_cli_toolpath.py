@@ -26,6 +26,46 @@ def test_correct_prints_json_for_machines(truepath, calibration, tmp_path):
     assert content["predicted_error_after_mm"]["max"] < 1e-3
 
 
+def test_its_own_work_is_not_corrected_twice_by_the_note_beside_it(truepath, calibration, tmp_path):
+    first = tmp_path / "wp.csv"
+    outcome = truepath("correct", WELD_PATH, "-c", calibration, "-o", first)
+    assert "weld_path.csv is taken for the original: a CSV without its note cannot be recognised" in outcome.out
+    assert f"written to {first}, with its note wp.csv.truepath.json" in outcome.out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["wp.csv", "wp.csv.truepath.json"]
+    for command in ("correct", "preview"):
+        again = truepath(command, first, "-c", calibration, "-o", tmp_path / "wp2.csv")
+        assert is_refused(again, "wp.csv: truepath has corrected this program already", "the program as it was before")
+    assert not (tmp_path / "wp2.csv").exists()
+
+
+def test_json_names_the_note(truepath, calibration, tmp_path):
+    options = ("correct", WELD_PATH, "-c", calibration, "-o", tmp_path / "wp.csv", "--json")
+    assert truepath(*options, "--dry-run").json()["note"] is None
+    note = truepath(*options).json()["note"]
+    assert note == str((tmp_path / "wp.csv.truepath.json").resolve())
+
+
+@pytest.mark.parametrize("options", [(), ("--as", "poses"), ("--as", "poses", "--start-deg=0,-90,90,-90,-90,0")])
+def test_a_path_that_ends_in_the_middle_of_a_number_is_told(truepath, calibration, tmp_path, options):
+    lines = POSE_PATH.read_text().splitlines()[:20]
+    for end, is_told in (("\n", False), ("", True)):
+        (tmp_path / "cut.csv").write_text("\n".join(lines) + end)
+        outcome = truepath("correct", tmp_path / "cut.csv", "-c", calibration, "--dry-run", *options)
+        told = "warning: cut-off in line 20: the last line has no line end: was the file cut off?" in outcome.out
+        assert (outcome.code, told) == (0, is_told)
+        assert outcome.err == ""
+
+
+def test_where_most_targets_collide_it_asks_whether_the_path_is_for_another_robot(truepath, calibration, tmp_path):
+    lines = (plants.models_dir() / "ur10" / "weld_path.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "ur10.csv").write_text("".join([lines[0], *lines[1::10]]))
+    options = ("-c", calibration, "--dry-run")
+    for path, is_asked in ((tmp_path / "ur10.csv", True), (WELD_PATH, False)):
+        out = truepath("correct", path, *options).out
+        assert ("does not change that; is it a program for another robot?" in out) is is_asked
+        assert ("the program itself drives" in out) is is_asked
+
+
 def spoiled(tmp_path, line, change):
     """The weld path with one waypoint changed."""
     lines = WELD_PATH.read_text().splitlines()

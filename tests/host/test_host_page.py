@@ -39,8 +39,16 @@ def transforms_of(page):
 
 
 def numbers_of(page):
-    """The predicted errors that the panel tells."""
+    """The errors that the panel tells: today, and to be expected with the correction."""
     return re.findall(r'<td class="number">([^<]+)</td>', page.read_text(encoding="utf-8"))
+
+
+def told_numbers(summary, calibration):
+    """What should stand there: predictions for today; errors on poses kept away where the data reached."""
+    today, held_out = summary.uncorrected_mm, calibration.heldout.calibrated.position_mm
+    known = summary.outside_region < summary.waypoints
+    expected = [f"{held_out.mean:.3f}", f"{held_out.max:.3f}"] if known else ["not known"] * 2
+    return [f"{today.mean:.3f}", f"{today.max:.3f}", *expected]
 
 
 def nearest_m(points, wanted):
@@ -71,11 +79,14 @@ def test_the_page_of_a_program_is_that_of_the_command_line(by_plugin, rigid, wel
     assert done.code == 0, done.err
     page, summary = by_plugin
     assert numbers_of(page) == numbers_of(by_command)
-    assert len(numbers_of(page)) == 4
+    assert numbers_of(page) == told_numbers(summary, rigid.calibration)
     one, other = data_of(page), data_of(by_command)
     for part in ("lines", "labels", "waypoints", "frames", "views"):
         assert one[part] == other[part]
-    assert summary.waypoints == len(one["labels"]) < 20
+    assert summary.waypoints == len(one["labels"]) == 16  # targets, as correct and deploy count them
+    assert f"mean {summary.uncorrected_mm.mean:.3f} mm, max {summary.uncorrected_mm.max:.3f} mm before" in done.out
+    assert f"to be expected on the robot with the correction: {summary.expected.source}" in done.out
+    assert "16 of 16 targets corrected" in done.out
     text = page.read_text(encoding="utf-8")
     assert "<title>weld.script</title>" in text
     assert "the tool that the program states" in text

@@ -48,6 +48,8 @@ def test_for_machines_there_is_json_and_the_criterion_can_be_d(truepath, output)
         ((*QUICK, "--clearance-mm", "-1"), "clearance"),
         (("--cell", "ur10_cell"), "another robot"),
         ((*QUICK, "--improve", "no.json", "no.csv"), "no.json"),
+        ((*QUICK, "--improve", "no.json"), "needs two files"),  # it would take "-o" for the second
+        (("--cell", "no_such_cell"), "no cell 'no_such_cell'"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_plain_words_and_nothing_is_written(truepath, output, arguments, says):

@@ -60,7 +60,7 @@ class TestThePageInABrowser:
         opened.go_to(1.0)
         assert opened.place() == "Waypoint 132 of 132"
         assert opened.tab.inner_text("#statement") == "point <131>"
-        assert re.fullmatch(r"Error \d\.\d\d mm → 0\.00 mm", opened.tab.inner_text("#error-here"))
+        assert re.fullmatch(r"Error \d\.\d\d mm → 0\.0\d mm expected", opened.tab.inner_text("#error-here"))
 
     def test_explains_itself(self, opened):
         panel = opened.tab.inner_text("#panel")
@@ -73,7 +73,8 @@ class TestThePageInABrowser:
             "Calibrated region",
             "132 waypoints",
             "Waypoints outside the calibrated region",
-            "measured poses that it had not seen",
+            "measured poses that the fit had not seen",
+            "Solver: the corrected joints meet the calibrated model to < 0.001 mm",
         ):
             assert text in panel
 
@@ -156,7 +157,7 @@ class TestThePageInABrowser:
         tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
         tab.goto(page_file.as_uri())
         assert "no WebGL" in tab.inner_text("#panel")
-        assert "Predicted error, mm" in tab.inner_text("#panel")
+        assert "Error of the tool, mm" in tab.inner_text("#panel")
         tab.close()
 
 

@@ -48,9 +48,10 @@ def page(tmp_path_factory, browser, program, calibration, rewritten):
 
 
 class TestWhatIsShown:
-    def test_waypoints_are_the_targets_but_points_within_arcs(self, shown, rewritten, program):
-        motions = rewritten.plan.motions
-        assert len(shown.waypoint) == (motions.kind != Kind.THROUGH).sum()
+    def test_waypoints_are_the_targets_with_the_points_that_arcs_pass(self, shown, rewritten, program):
+        kind = rewritten.plan.motions.kind
+        assert len(shown.waypoint) == len(rewritten.plan) == rewritten.summary()["targets"]
+        assert (kind == Kind.THROUGH).sum() == 2
         written = program.read_text().splitlines()
         for line, label in zip(shown.line, shown.labels, strict=True):
             assert label == written[line - 1].strip()
@@ -69,8 +70,18 @@ class TestWhatIsShown:
 
     def test_errors_are_those_of_the_correction(self, shown, rewritten, calibration):
         paths = Toolpaths.of(calibration.model, shown.q_meant, shown.q_today, shown.q_corrected, shown.X_FT)
-        told = rewritten.error_before_mm[rewritten.plan.motions.kind != Kind.THROUGH]
-        np.testing.assert_allclose(paths.errors_mm()[0][shown.waypoint], told, atol=1e-9)
+        for drawn, told in zip(paths.errors_mm(), (rewritten.error_before_mm, rewritten.error_after_mm), strict=True):
+            np.testing.assert_allclose(drawn[shown.waypoint], told, atol=1e-9)
+
+    def test_arcs_pass_their_points_on_the_way(self, shown, rewritten, calibration):
+        """In the order in which the tool does: it turns the same way all along."""
+        paths = Toolpaths.of(calibration.model, shown.q_meant, shown.q_today, shown.q_corrected, shown.X_FT)
+        for through in np.flatnonzero(rewritten.plan.motions.kind == Kind.THROUGH):
+            first, passed, last = shown.waypoint[through - 1 : through + 2]
+            assert last - passed > 5 < passed - first
+            assert shown.joined[first + 1 : last + 1].all()
+            steps = np.diff(paths.goal[first : last + 1], axis=0)
+            assert (np.sum(steps[1:] * steps[:-1], axis=1) > -1e-12).all()  # 0 at a sample where the point itself lies
 
     def test_the_tool_is_the_one_the_program_states(self, shown):
         assert np.linalg.norm(shown.X_FT[:3, 3]) == pytest.approx(np.hypot(0.08, 0.16))
@@ -93,6 +104,13 @@ class TestItsPage:
         line = program.read_text().splitlines().index(FAST) + 1
         assert page.place().endswith(f"· line {line}")
         assert page.tab.inner_text("#statement") == FAST.strip()
+
+    def test_tells_what_to_expect_only_where_the_data_reached(self, page, calibration):
+        page.go_to(0.0)
+        mean_mm = calibration.heldout.calibrated.position_mm.mean
+        assert page.tab.inner_text("#error-here").endswith(f"→ {mean_mm:.2f} mm expected")
+        page.go_to(1.0)
+        assert page.tab.inner_text("#error-here").endswith("→ not known")
 
     def test_jumps_to_a_warning(self, page, program):
         page.go_to(0.0)

@@ -47,6 +47,8 @@ def test_spoilt_programs_end_in_a_clear_error_or_a_result(fuzz, calibration, tmp
         (2, "error: program.csv: no\n", set(), 0.1, None),
         (0, "", {"corrected.csv"}, 0.1, None),
         (1, "", {"corrected.csv"}, 0.1, None),
+        (0, "", {"corrected.csv", "corrected.csv.truepath.json"}, 0.1, None),
+        (0, "", {"corrected.csv.truepath.json"}, 0.1, "leaves corrected.csv.truepath.json"),
         (3, "Traceback\nValueError: x\n", set(), 0.1, "ValueError: x"),
         (2, "error: program.csv: no\n", {"corrected.csv"}, 0.1, "is refused and leaves corrected.csv"),
         (2, "error: no\n", set(), 0.1, "no clear message: error: no"),

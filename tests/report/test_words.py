@@ -28,7 +28,10 @@ def test_three_significant_digits(value, text):
         (0.43, "p = 0.43"),
         (3.2e-9, "p = 3 \N{MULTIPLICATION SIGN} 10⁻⁹"),
         (9.7e-6, "p = 1 \N{MULTIPLICATION SIGN} 10⁻⁵"),
-        (0.0, "p < 10⁻³⁰⁰"),
+        (1.2e-12, "p = 1 \N{MULTIPLICATION SIGN} 10⁻¹²"),
+        (0.9e-12, "p < 10⁻¹²"),
+        (1e-300, "p < 10⁻¹²"),
+        (0.0, "p < 10⁻¹²"),
     ],
 )
 def test_probabilities(p, text):
@@ -37,7 +40,15 @@ def test_probabilities(p, text):
 
 @pytest.mark.parametrize(
     ("odds", "text"),
-    [(math.log(150), "150 to 1"), (38.5 * math.log(10), "10³⁸ to 1"), (-math.log(20), "1 to 20"), (4e3, "10¹⁷³⁷ to 1")],
+    [
+        (math.log(150), "150 to 1"),
+        (9.5 * math.log(10), "10⁹ to 1"),
+        (-math.log(20), "1 to 20"),
+        (11.9 * math.log(10), "10¹¹ to 1"),
+        (12.1 * math.log(10), "more than 10¹² to 1"),
+        (4e3, "more than 10¹² to 1"),
+        (-4e3, "less than 1 to 10¹²"),
+    ],
 )
 def test_odds(odds, text):
     assert words.odds(odds) == text
@@ -56,6 +67,19 @@ def test_odds(odds, text):
 )
 def test_values_have_the_digits_that_their_sigma_leaves_them(value, sigma, unit, text):
     assert words.in_readable_unit(value, sigma, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("in the model (p = 3e-40)", "in the model (p < 10⁻¹²)"),
+        ("in the model (p = 2.6e-05)", "in the model (p = 2.6 \N{MULTIPLICATION SIGN} 10⁻⁵)"),
+        ("left out; p = 0.25 proves no gain", "left out; p = 0.25 proves no gain"),
+        ("a gain of 3e-5 mm", "a gain of 3 \N{MULTIPLICATION SIGN} 10⁻⁵ mm"),
+    ],
+)
+def test_powers_within_a_sentence(text, read):
+    assert words.with_powers(text) == read
 
 
 def test_lists_and_joints():

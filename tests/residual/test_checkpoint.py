@@ -161,23 +161,8 @@ def test_a_file_that_is_not_there_is_a_fresh_start(tmp_path, lesson, uninterrupt
 
 def test_a_file_that_is_no_checkpoint_is_refused_by_name(tmp_path):
     path = tmp_path / "other.json"
-    for content in (
-        b"",
-        b"{",
-        b"null",
-        b"[]",
-        b"{}",
-        b'{"schema": "truepath.calibration/1"}',
-        b'{"schema": "truepath.evolution/3", "finished": {}, "under_way": {}}',
-        b'{"schema": "truepath.evolution/2", "finished": [], "under_way": {}}',
-        b'{"schema": "truepath.evolution/2", "finished": {}, "under_way": {}, "more": 1}',
-        b'{"schema": "truepath.evolution/2", "finished": {}}',
-        b"\xff\xfe",
-        b"q1_rad,q2_rad\n0,0\n",
-        b"[" * 100_000,
-        b'{"schema": "truepath.evolution/2", "finished": {"a": {"hidden": [[NaN, 1]], "output": [[1]], "bias": [1]}}, '
-        b'"under_way": {}}',
-    ):
+    schema = b'{"schema": "truepath.calibration/1"}'
+    for content in (b"", b"{", b"null", b"[]", b"{}", schema, b"\xff\xfe", b"q1_rad,q2_rad\n0,0\n", b"[" * 100_000):
         path.write_bytes(content)
         with pytest.raises(InputError, match=r"other\.json: this is no checkpoint"):
             Checkpoint(path)

@@ -1,7 +1,8 @@
 """Which robot a program says it is for."""
 
+import numpy as np
 import pytest
-from truepath.rewriting.named_robot import robot_named_in
+from truepath.rewriting.named_robot import is_most_of, robot_named_in
 
 
 @pytest.mark.parametrize(
@@ -30,3 +31,8 @@ def test_a_robot_after_the_word_for_it(text, robot):
 )
 def test_programs_that_do_not_say_it(text):
     assert robot_named_in(text) is None
+
+
+@pytest.mark.parametrize(("wrong", "count", "is_most"), [(3, 3, False), (2, 4, False), (3, 4, True), (0, 0, False)])
+def test_many_wrong_targets_look_like_those_of_another_robot_and_one_does_not(wrong, count, is_most):
+    assert is_most_of(np.arange(count) < wrong) is is_most

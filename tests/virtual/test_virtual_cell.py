@@ -47,6 +47,12 @@ def test_the_truth_file_is_all_it_takes_to_build_the_same_robot(real, joints):
     assert np.abs(real.reflector_poses(joints) - reflector_poses(told, joints)).max() < 1e-12
 
 
+def test_the_truth_file_tells_the_robot_s_seed_from_that_of_the_poses():
+    told = json.loads(truth_json(RealRobot("ur5", 7), Campaign(seed=3)))
+    assert (told["robot_seed"], told["campaign"]["poses_seed"]) == (7, 3)
+    assert "seed" not in told["campaign"]
+
+
 def test_the_same_seed_hides_the_same_errors_and_another_seed_others(real, joints):
     again, other = RealRobot("ur5", 0), RealRobot("ur5", 1)
     assert np.array_equal(again.reflector_poses(joints), real.reflector_poses(joints))

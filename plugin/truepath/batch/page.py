@@ -14,6 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.ticker import MaxNLocator
 
+from truepath.expected import NOT_KNOWN
 from truepath.look import stylesheet
 from truepath.report.canvas import AFTER, BEFORE, PALE, new_axes, write_svg
 
@@ -21,7 +22,7 @@ SIGNS = {"corrected": "✓", "unchanged": "=", "partial": "◐", "refused": "✕
 MEANINGS = {
     "corrected": "targets moved, file written",
     "unchanged": "nothing had to move, file written as it was",
-    "partial": "some targets cannot be resolved without running the program; they stay as they are",
+    "partial": "some targets cannot be corrected; they stay as they are",
     "refused": "a guard forbids it or the program is faulty; no file written",
     "failed": "truepath or its workers broke; no file written",
     "pending": "stopped before its turn; the same command goes on",
@@ -55,7 +56,15 @@ def render(summary: dict[str, Any]) -> str:
         meanings=MEANINGS,
         calibrations=sorted({each["calibration"] for each in programs}),
         histogram=_histogram(programs),
+        expected=_expected(summary["totals"]),
+        not_known=NOT_KNOWN,
     )
+
+
+def _expected(totals: dict[str, Any]) -> dict[str, float] | None:
+    """Errors to be expected after the correction; None where nobody knows, or nothing was corrected."""
+    known = totals["outside_calibrated_region"] < totals["corrected_targets"]
+    return totals["heldout_error_mm"] if known else None
 
 
 def _histogram(programs: list[dict[str, Any]]) -> Markup | None:
@@ -70,7 +79,7 @@ def _histogram(programs: list[dict[str, Any]]) -> Markup | None:
     mean, most = (np.array([each[name] for each in known]) for name in ("mean", "max"))
     axes.hist(mean, edges, histtype="stepfilled", facecolor=PALE[AFTER], edgecolor=AFTER, linewidth=1.2, zorder=2)
     axes.hist(most, edges, histtype="step", edgecolor=BEFORE, linewidth=1.8, linestyle=(0, (5, 2)), zorder=3)
-    axes.set_xlim(0.0, edges[-1])
+    axes.set_xlim(0.0, 1.02 * edges[-1])  # the last edge is a line of some width
     label = (
         f"Histogram of corrections of {len(known)} programs: mean of a program {np.median(mean):.3f} mm, "
         f"largest of a program {np.median(most):.3f} mm (medians), largest of all {largest:.3f} mm"

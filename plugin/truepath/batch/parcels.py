@@ -10,6 +10,7 @@ from truepath.batch.results import read_program
 from truepath.batch.tasks import Task
 from truepath.batch.work import Item, Parcel
 from truepath.errors import InputError
+from truepath.rewriting.note import refuse_if_noted
 
 MOST_PROGRAMS, MOST_BYTES = 32, 1 << 20
 PARCELS_EACH = 8  # for every worker, so that none of them idles long at the end
@@ -21,7 +22,7 @@ def tie_up(tasks: Sequence[Task], workers: int, refuse: Callable[[Task, InputErr
     Args:
         tasks: to be done.
         workers: that share the work.
-        refuse: is told of a program that cannot be read.
+        refuse: is told of a program that cannot be read, or that is corrected already.
     """
     most = min(MOST_PROGRAMS, max(1, math.ceil(len(tasks) / (PARCELS_EACH * workers))))
     groups: dict[int, list[Task]] = {}
@@ -33,6 +34,7 @@ def tie_up(tasks: Sequence[Task], workers: int, refuse: Callable[[Task, InputErr
         for task in group:
             try:
                 item = Item(task.number, task.name, read_program(task))
+                refuse_if_noted(task.program, item.content)  # here, where its note is: workers get its content alone
             except InputError as error:
                 refuse(task, error)
                 continue

@@ -14,6 +14,7 @@ from truepath.batch.tasks import ENDINGS, RESULT, Task
 from truepath.batch.work import Outcome, Status
 from truepath.errors import InputError
 from truepath.files import write_atomically
+from truepath.rewriting.note import drop_note, write_with_note
 
 SCHEMA: Literal["truepath.batch-result/1"] = "truepath.batch-result/1"
 MAX_BYTES = 256 << 20
@@ -48,6 +49,7 @@ class Summary(BaseModel):
     path: PathSummary = PathSummary()
     unresolved: list[Unresolved] = []
     warnings: list[str] = []
+    outside_calibrated_region: int = 0
     displacement_mm: Spread | None = None
     predicted_error_before_mm: Spread | None = None
     predicted_error_after_mm: Spread | None = None
@@ -123,12 +125,13 @@ def keep(task: Task, outcome: Outcome, key: Mapping[str, str], attempts: int) ->
         raise InputError("the folder cannot be made", file=task.output.parent, found=error.strerror) from None
     message = outcome.message
     if content is not None:
-        write_atomically(task.output, content)
+        write_with_note(task.output, content, outcome.note)
         output_sha256 = hashlib.sha256(content).hexdigest()
     elif (there := _hash_of(task.output)) is not None:
         before = _read(task.result)
         if before is not None and before.output_sha256 == there:
             task.output.unlink()
+            drop_note(task.output)
         else:
             message += f"\n{task.output} is there, but it is not the result of this program"
     result = Result(

@@ -78,6 +78,7 @@ class Prepared:
 
     Attributes:
         calibration_path, calibration: the file and its content.
+        heldout_mm: errors on poses that the fit had not seen; None if none were held back.
         settings: as stated.
         controller_file: content of the file that ``controller_kinematics`` names; None for ``nominal``.
         key: hashes of all that a result depends on besides the program. Meshes of a cell are not looked into.
@@ -90,6 +91,7 @@ class Prepared:
             InputError: a file that is missing or bad.
         """
         self.calibration_path, self.calibration, self.settings = path, content, settings
+        self.heldout_mm = None if calibration.heldout is None else calibration.heldout.calibrated.position_mm
         self.controller_file: bytes | None = None
         if settings.controller_kinematics != NOMINAL:
             controller_of(calibration.model.robot, settings.controller_kinematics)

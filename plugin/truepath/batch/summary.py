@@ -16,6 +16,7 @@ from truepath.batch.tasks import Task
 SCHEMA = "truepath.batch/1"
 PENDING = "pending"
 STATUSES = ("corrected", "unchanged", "partial", "refused", "failed", PENDING)
+HELD_OUT = ("mean", "p95", "max")
 GOOD = ("corrected", "unchanged")
 
 
@@ -41,12 +42,15 @@ def summarise(batch: Batch, folder: Path) -> dict[str, Any]:
             **count,
             "resumed": len(batch.resumed),
             "targets": _total(programs, "targets"),
+            "corrected_targets": _total(programs, "corrected_targets"),
             "added_targets": _total(programs, "added_targets"),
             "unresolved": _total(programs, "unresolved"),
+            "outside_calibrated_region": _total(programs, "outside_calibrated_region"),
             "warnings": sum(len(each["warnings"]) for each in programs),
             "displacement_mm": _mean_and_max(programs, "displacement_mm"),
             "predicted_error_before_mm": _mean_and_max(programs, "predicted_error_before_mm"),
             "predicted_error_after_mm": _mean_and_max(programs, "predicted_error_after_mm"),
+            "heldout_error_mm": _worst(programs),
         },
         "left_over": [_from(path, folder) for path in left_over(folder, batch.tasks)],
         "programs": programs,
@@ -79,12 +83,28 @@ def _program(batch: Batch, task: Task, result: Result | None, folder: Path) -> d
         "added_targets": content.path.added,
         "unresolved": len(content.unresolved),
         "unresolved_lines": [each.line for each in content.unresolved],
+        "outside_calibrated_region": content.outside_calibrated_region,
         "displacement_mm": _pick(content.displacement_mm),
         "predicted_error_before_mm": _pick(content.predicted_error_before_mm),
         "predicted_error_after_mm": _pick(content.predicted_error_after_mm),
+        "heldout_error_mm": _heldout_mm(task),
         "warnings": content.warnings,
         "sha256": {} if result is None else {**result.key, "output": result.output_sha256},
     }
+
+
+def _heldout_mm(task: Task) -> dict[str, float] | None:
+    """Of the program's calibration, on poses that its fit had not seen; None if none were held back."""
+    errors = task.prepared.heldout_mm
+    return None if errors is None else {name: getattr(errors, name) for name in HELD_OUT}
+
+
+def _worst(programs: Sequence[dict[str, Any]]) -> dict[str, float] | None:
+    """Of all calibrations, each number for itself; None if it is not known of one of them."""
+    errors = [each["heldout_error_mm"] for each in programs]
+    if not errors or None in errors:
+        return None
+    return {name: max(each[name] for each in errors) for name in HELD_OUT}
 
 
 def _from(path: Path, folder: Path) -> str:

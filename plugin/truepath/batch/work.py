@@ -23,6 +23,7 @@ from truepath.batch.settings import Settings
 from truepath.calibration import Calibration, load_calibration
 from truepath.errors import InputError, TruepathError
 from truepath.rewriting.rewrite import RewrittenProgram, rewrite_program
+from truepath.stamp import Stamp
 
 Status = Literal["corrected", "unchanged", "partial", "refused", "failed"]
 
@@ -66,6 +67,7 @@ class Outcome:
         message: why it was refused or failed.
         summary: as ``truepath correct --json`` prints it.
         content: corrected program.
+        note: what the note beside it says; None where it needs none.
         worker: who did it: host and process.
         seconds: that it took.
     """
@@ -77,6 +79,7 @@ class Outcome:
     content: bytes | None = None
     worker: str = ""
     seconds: float = 0.0
+    note: Stamp | None = None
 
 
 def worker_version() -> str:
@@ -103,7 +106,7 @@ def _correct(item: Item, parcel: Parcel, folder: Path) -> Outcome:
     file = folder / f"program{Path(item.name).suffix}"
     names = [(str(file), item.name)]
     status: Status
-    message, summary, content = "", None, None
+    message, summary, content, note = "", None, None, None
     try:
         file.write_bytes(item.content)
         calibration = _calibration(parcel.calibration, parcel.settings.payload_kg)
@@ -115,12 +118,13 @@ def _correct(item: Item, parcel: Parcel, folder: Path) -> Outcome:
             kinematics = str(copy)
         rewritten = rewrite_program(file, calibration, parcel.settings.options(calibration, kinematics))
         status, summary, content = _status(rewritten), _renamed(rewritten.summary(), names), rewritten.content
+        note = rewritten.note
     except TruepathError as error:
         status, message = "refused", _renamed(str(error), names)
     except Exception as error:  # whatever one program brings about, the others are not concerned
         trace = "".join(traceback.format_exception(error)[-3:])
         status, message = "failed", _renamed(f"truepath broke, which is a fault of its own:\n{trace}", names)
-    return Outcome(item.number, status, message, summary, content, _who(), time.perf_counter() - start)
+    return Outcome(item.number, status, message, summary, content, _who(), time.perf_counter() - start, note)
 
 
 def _status(rewritten: RewrittenProgram) -> Status:

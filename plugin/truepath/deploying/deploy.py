@@ -21,6 +21,7 @@ from truepath.deploying.checks import (
     tcp_obstacles,
 )
 from truepath.deploying.follow import Followed, Watched, send_and_follow
+from truepath.deploying.left_uncorrected import uncorrected_remarks
 from truepath.deploying.load import Load, calibrated_load
 from truepath.deploying.outcome import Outcome, outcome_of
 from truepath.deploying.passages import Passages
@@ -119,6 +120,8 @@ def prepare(path: str | Path, calibration: Calibration, link: RobotLink, options
         RobotFault: the robot does not answer.
     """
     program = read_program(path)
+    robot = calibration.model.robot
+    controller = controller_of(robot, options.controller_kinematics)
     remarks = robot_remarks(program, calibration)
     try:
         require_correction(program, calibration)
@@ -126,8 +129,8 @@ def prepare(path: str | Path, calibration: Calibration, link: RobotLink, options
         if not options.uncorrected:
             raise
         remarks.append(f"{error.problem}: the tool may go elsewhere than the program means")
-    robot = calibration.model.robot
-    controller = controller_of(robot, options.controller_kinematics)
+    else:
+        remarks += uncorrected_remarks(program, robot, controller, options.tool, options.start_rad)
     state, obstacles, unknown = robot_obstacles(link)
     if obstacles:
         raise NotReady(obstacles)
@@ -232,7 +235,8 @@ def _tool_of(rehearsal: Rehearsal, settings: Settings, options: DeployOptions) -
 def _open_end_remarks(rehearsal: Rehearsal, settings: Settings) -> list[str]:
     if rehearsal.open_end is None:
         return []
-    known = f"only the first {len(rehearsal)} targets are known" if len(rehearsal) else "no target is known"
+    first = "target is" if len(rehearsal) == 1 else f"{len(rehearsal)} targets are"
+    known = f"only the first {first} known" if len(rehearsal) else "no target is known"
     remarks = [f"{known}: {rehearsal.open_end}"]
     if not len(rehearsal):
         remarks.append("nobody has looked at posture, joint limits and the way to the first target")

@@ -84,6 +84,7 @@ class Outcome:
             "samples": self.followed.samples,
             "longest_gap_s": self.followed.gap_s,
             "targets": len(self.rehearsal),
+            "via_points": self.rehearsal.through,
             "passed": self.passed,
             "passed_unseen": self.unseen,
             "not_known": self.rehearsal.open_end,

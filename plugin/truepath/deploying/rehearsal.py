@@ -57,6 +57,11 @@ class Rehearsal:
         return len(self.line)
 
     @property
+    def through(self) -> int:
+        """How many points are passed on arcs, besides the targets at their ends."""
+        return int((~np.isnan(self.p_via[:, 0])).sum())
+
+    @property
     def depends_on_tool(self) -> bool:
         """Whether another tool on the controller would lead the arm elsewhere, or along other ways."""
         return bool((self.is_pose | ~np.isin(self.kind, (Kind.JOINT, Kind.SERVO))).any())

@@ -34,8 +34,9 @@ def robot_in_cell(robot: str, cell: str | None) -> tuple[NominalRobot, str | Pat
     if cell == NOWHERE:
         return wanted, None
     spec = plants.cell_of(robot) if cell is None else cell
+    file = plants.resolve(spec, "cell")
     found = plants.load_robot(spec)
-    require_same_robot(wanted, found, "another robot stands in this cell", plants.resolve(spec))
+    require_same_robot(wanted, found, "another robot stands in this cell", file)
     return found, spec
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from truepath.calibration import Calibration
 from truepath.errors import InputError
+from truepath.expected import ExpectedError
 from truepath.files import write_atomically
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
@@ -43,7 +44,9 @@ class PreviewSummary:
         output: the page.
         waypoints, outside_region: how many there are, and how many the calibration data did not reach.
         uncorrected_mm, corrected_mm: distance of the real tool point from the programmed one at the
-            waypoints, as the calibration predicts it.
+            waypoints, as the calibration predicts it. The latter is how exactly the solver meets the calibrated
+            model; what the robot will do is ``expected``.
+        expected: what remains to be expected on the robot with the correction.
         magnification: factor by which errors are drawn.
         key_frames: of the animation; 1 where nothing moves.
         missing_meshes: files that the robot model names and that could not be read; they are not drawn.
@@ -56,6 +59,7 @@ class PreviewSummary:
     outside_region: int
     uncorrected_mm: ErrorStatistics
     corrected_mm: ErrorStatistics
+    expected: ExpectedError
     magnification: float
     key_frames: int
     missing_meshes: tuple[str, ...]
@@ -167,32 +171,35 @@ def write_shown(
     scale_mm = scale_end_mm(fine.paths.errors_mm()[0])
     recorded = record_scene(Drawing(arm, model, fine, frames, p_FT, factor, scale_mm, covered))
     remarks = (*shown.remarks, *shown.stretches_outside(region))
+    outside_count = int(outside[shown.waypoint].sum())
+    expected = ExpectedError.of(calibration, len(shown.waypoint), outside_count)
     text = PageText(
         title=title,
         robot=calibration.robot.name,
         calibrated_utc=calibration.created_utc,
         waypoints=len(shown.waypoint),
-        outside=int(outside[shown.waypoint].sum()),
+        outside=outside_count,
         magnification=factor,
         scale_mm=scale_mm,
         tool=tool_name,
         base_mm=1e3 * model.robot.X_WB[:3, 3],
         uncorrected=uncorrected,
         corrected=corrected,
-        model_error=None if calibration.heldout is None else calibration.heldout.calibrated.position_mm,
+        expected=expected,
         missing_meshes=arm.missing_meshes,
         networks=networks,
         remarks=remarks,
         has_region=covered is not None,
         report=report,
     )
-    write_atomically(output, render(text, shown, recorded, frames))
+    write_atomically(output, render(text, shown, outside[shown.waypoint], recorded, frames))
     return PreviewSummary(
         output=output,
         waypoints=text.waypoints,
         outside_region=text.outside,
         uncorrected_mm=uncorrected,
         corrected_mm=corrected,
+        expected=expected,
         magnification=factor,
         key_frames=len(frames.time_s),
         missing_meshes=arm.missing_meshes,

@@ -30,7 +30,7 @@ class KeyFrames:
         position: ``(K,)`` fractional row of the shown path.
         q_uncorrected, q_corrected: ``(K, n)`` joints with which the nominal arm, as it is drawn, has its tool
             point on the magnified line of the real robot.
-        error_uncorrected_mm, error_corrected_mm: ``(K,)`` true size of the errors there.
+        error_uncorrected_mm: ``(K,)`` true size of the errors without correction there.
     """
 
     time_s: Array
@@ -38,7 +38,6 @@ class KeyFrames:
     q_uncorrected: Array
     q_corrected: Array
     error_uncorrected_mm: Array
-    error_corrected_mm: Array
 
 
 def animate(model: CalibratedModel, fine: FinePaths, p_FT: Array, magnification: float) -> KeyFrames:
@@ -55,14 +54,14 @@ def animate(model: CalibratedModel, fine: FinePaths, p_FT: Array, magnification:
         duration = float(np.clip(travel[-1] / JOINT_SPEED_RAD_S, SHORTEST_S, LONGEST_S))
         time_s = travel / travel[-1] * duration
         kept = _chosen(fine, magnification)
-    drawn, errors = fine.paths.magnified(magnification).at(kept), fine.paths.at(kept).errors_mm()
+    drawn, error_mm = fine.paths.magnified(magnification).at(kept), fine.paths.at(kept).errors_mm()[0]
     meant = fine.q_meant[kept]
     return KeyFrames(
         time_s[kept],
         fine.position[kept],
         joints_reaching(model.robot, drawn.uncorrected, p_FT, meant),
         joints_reaching(model.robot, drawn.corrected, p_FT, meant),
-        *errors,
+        error_mm,
     )
 
 

@@ -78,6 +78,8 @@ function connectPlayback(viewer, data) {
   const [play, scrubber, place, statement] = ["play", "scrubber", "place", "statement"].map(element);
   const millimetres = (value) => `${value.toFixed(2)} mm`;
   const count = data.waypoints.length;
+  const expectedAt = (k) =>
+    data.expected_mm === null || data.outside[k] ? "not known" : `${millimetres(data.expected_mm)} expected`;
   const playback = makePlayback(viewer, data, (now) => {
     const next = Math.ceil(now.waypoint - 1e-3); // the statement at which the robot works
     scrubber.value = now.waypoint + 1;
@@ -87,7 +89,7 @@ function connectPlayback(viewer, data) {
     statement.textContent = data.labels[next] || "";
     statement.hidden = !statement.textContent;
     element("error-here").textContent =
-      `Error ${millimetres(now.uncorrected_mm)} → ${millimetres(now.corrected_mm)}`;
+      `Error ${millimetres(now.uncorrected_mm)} → ${expectedAt(next)}`;
   });
   const goTo = playback.goToWaypoint;
   play.addEventListener("click", () => playback.play(!playback.isPlaying()));

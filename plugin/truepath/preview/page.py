@@ -13,7 +13,7 @@ import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from truepath.calibration_parts import StatisticsPart
+from truepath.expected import NOT_KNOWN, ExpectedError
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
 from truepath.look import stylesheet
@@ -41,7 +41,7 @@ class PageText:
         tool: whose paths these are.
         base_mm: ``(3,)`` where the robot's base is in the world, mm.
         uncorrected, corrected: predicted errors at the waypoints, mm.
-        model_error: errors of the calibrated model itself on poses it had not seen, mm; None if unknown.
+        expected: what remains to be expected on the robot with the correction.
         missing_meshes: what could not be drawn.
         networks: what they say at the waypoints; None where the calibration has none.
         remarks: what to look at.
@@ -60,7 +60,7 @@ class PageText:
     base_mm: Array
     uncorrected: ErrorStatistics
     corrected: ErrorStatistics
-    model_error: StatisticsPart | None
+    expected: ExpectedError
     missing_meshes: tuple[str, ...]
     networks: NetworksAlong | None
     remarks: tuple[Remark, ...]
@@ -68,12 +68,13 @@ class PageText:
     report: str | None = None
 
 
-def render(text: PageText, shown: ShownPath, recorded: RecordedScene, frames: KeyFrames) -> str:
+def render(text: PageText, shown: ShownPath, outside: Array, recorded: RecordedScene, frames: KeyFrames) -> str:
     """The page.
 
     Args:
         text: what the panel says.
         shown: the path, for lines and texts of its waypoints.
+        outside: ``(T,)`` True for waypoints outside the calibrated region.
         recorded: what is to be seen.
         frames: the animation.
     """
@@ -92,9 +93,11 @@ def render(text: PageText, shown: ShownPath, recorded: RecordedScene, frames: Ke
         policy=policy,
         css=Markup(stylesheet() + _read("page.css")),
         scripts=[Markup(script) for script in scripts],
-        data=Markup(payload(shown, recorded, frames)),
+        data=Markup(payload(shown, outside, text.expected.known_mm, recorded, frames)),
         licences=Markup(_licences()),
         text=text,
+        expected=text.expected.known_mm,
+        not_known=NOT_KNOWN,
         drawn=larger or "errors drawn in true size",
         gradient=", ".join(colours.ERROR_SCALE),
         ticks=[f"{share * text.scale_mm:.3g}" for share in (0.0, 0.25, 0.5, 0.75, 1.0)],
@@ -117,13 +120,13 @@ def _notes(text: PageText) -> list[tuple[str, str]]:
         notes = [("", f"{where}: none of {text.waypoints}.")]
     if text.networks is not None:
         notes += _network_notes(text.networks)
-    predicted = "Errors are what the calibrated model predicts."
-    if text.model_error is not None:
-        predicted += (
-            f" The model itself was off by {text.model_error.mean:.3f} mm (mean) and "
-            f"{text.model_error.max:.3f} mm (max) on measured poses that it had not seen."
-        )
-    notes.append(("", predicted))
+    notes.append(
+        ("" if text.expected.known_mm is not None else " warning", f"Expected with correction: {text.expected.source}.")
+    )
+    notes.append(("", "Without correction: as the calibrated model predicts."))
+    exact = in_mm(text.corrected.max)
+    is_solved = f"to {exact} mm" if exact.startswith("<") else f"within {exact} mm"
+    notes.append(("", f"Solver: the corrected joints meet the calibrated model {is_solved}. That is no accuracy."))
     base = ", ".join(f"{value + 0.0:.0f}" for value in np.round(text.base_mm))
     grid = f"Grid 100 mm, level. The large axes are the robot base frame, at ({base}) mm in the world"
     notes.append(("", f"Paths are those of {text.tool}. {grid}."))

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from truepath.calibration_parts import StatisticsPart
 from truepath.lie import Array
 from truepath.preview import scene
 from truepath.preview.keyframes import KeyFrames
@@ -16,8 +17,14 @@ from truepath.preview.shown import ShownPath
 from truepath.preview.stage import joint_node
 
 
-def payload(shown: ShownPath, recorded: RecordedScene, frames: KeyFrames) -> str:
-    """JSON that can stand in a script element."""
+def payload(
+    shown: ShownPath, outside: Array, expected: StatisticsPart | None, recorded: RecordedScene, frames: KeyFrames
+) -> str:
+    """JSON that can stand in a script element; arguments as of ``page.render``.
+
+    Args:
+        expected: errors with the correction, of waypoints within the calibrated region; None: not known.
+    """
     content: dict[str, Any] = {
         "root": scene.ROOT,
         "chunks": [base64.b64encode(chunk).decode("ascii") for chunk in recorded.chunks],
@@ -39,9 +46,10 @@ def payload(shown: ShownPath, recorded: RecordedScene, frames: KeyFrames) -> str
             "q_corrected": _binary(frames.q_corrected),
             "q_uncorrected": _binary(frames.q_uncorrected),
             "uncorrected_mm": _binary(frames.error_uncorrected_mm),
-            "corrected_mm": _binary(frames.error_corrected_mm),
         },
         "waypoints": _binary(shown.waypoint, "u4"),
+        "expected_mm": None if expected is None else expected.mean,
+        "outside": _binary(outside, "u4"),
         "lines": None if shown.line is None else _binary(shown.line, "u4"),
         "labels": shown.labels,
     }

@@ -46,7 +46,6 @@ function makePlayback(viewer, data, show) {
     show({
       waypoint: between(waypoints, row),
       uncorrected_mm: valueAt(frames.uncorrected_mm, at),
-      corrected_mm: valueAt(frames.corrected_mm, at),
       playing,
     });
   }

@@ -15,6 +15,7 @@ from truepath.lie import Array
 from truepath.model import CalibratedModel
 from truepath.programs.motions import Kind
 from truepath.region import Region
+from truepath.rewriting.plan import tool_poses_meant
 
 if TYPE_CHECKING:
     from truepath.controller import Controller
@@ -88,7 +89,7 @@ class ShownPath:
 
     @classmethod
     def of_program(cls, rewritten: RewrittenProgram, controller: Controller, text: str | None = None) -> ShownPath:
-        """All targets of a program but the points within arcs, and samples of the lines and arcs between them.
+        """All targets of a program, points that arcs pass among them, and samples of lines and arcs between them.
 
         Args:
             rewritten: the program, with at least one target.
@@ -96,7 +97,6 @@ class ShownPath:
             text: of the program, whose lines are shown; None: only their numbers are.
         """
         plan, ways, motions = rewritten.plan, rewritten.ways, rewritten.plan.motions
-        target = np.flatnonzero(motions.kind != Kind.THROUGH)
         followed = ways.followed[np.repeat(np.arange(len(ways.target)), np.diff(ways.first))]
         way = np.repeat(np.arange(len(ways.target)), np.diff(ways.first))[followed]
         share = ways.share[followed][:, None]
@@ -107,23 +107,24 @@ class ShownPath:
         off = plan.q_today_rad - plan.q_rad
         off_on_way = (1.0 - share) * off[ways.start[way]] + share * off[ways.target[way]]
         q_way = ways.q_rad[followed]
-        order = np.concatenate([target, ways.target[way] - 1.0 + share[:, 0]])
+        place, belongs_to = _places(rewritten, controller)
+        order = np.concatenate([place, ways.target[way] - 1.0 + share[:, 0]])
         sequence = np.argsort(order, kind="stable")
-        of = np.concatenate([target, ways.target[way]])[sequence]
-        waypoint = np.flatnonzero(sequence < len(target))
+        of = np.concatenate([belongs_to, ways.target[way]])[sequence]
+        waypoint = np.flatnonzero(sequence < len(motions))
         row_of = np.full(len(motions) + 1, -2)  # the last one is that of "not known"
-        row_of[target] = waypoint
+        row_of[:-1] = waypoint
         first = np.diff(of, prepend=-1) != 0
         joined = ~first | (row_of[start_of[of]] == np.arange(len(of)) - 1)
         q_meant, q_today, q_corrected = (
             np.concatenate(parts)[sequence]
             for parts in (
-                (plan.q_rad[target], q_way),
-                (plan.q_today_rad[target], q_way + off_on_way),
-                (rewritten.correction.q_rad[target], ways.q_corrected_rad[followed]),
+                (plan.q_rad, q_way),
+                (plan.q_today_rad, q_way + off_on_way),
+                (rewritten.correction.q_rad, ways.q_corrected_rad[followed]),
             )
         )
-        line = motions.line[target].astype(int)
+        line = motions.line.astype(int)
         written = [] if text is None else text.splitlines()
         labels = tuple(_short(written[k - 1].strip()) if k <= len(written) else "" for k in line.tolist())
         return cls(
@@ -134,7 +135,7 @@ class ShownPath:
             waypoint,
             line,
             labels if written else (),
-            _only_tool(controller.X_F0 @ motions.X_0T[target]),
+            _only_tool(controller.X_F0 @ motions.X_0T),
             _remarks(rewritten, line),
             rewritten.cell,
         )
@@ -173,6 +174,23 @@ def require_joints(q_programmed: Array, q_corrected: Array, num_joints: int) -> 
             expected=str(len(q_programmed)),
             found=str(len(q_corrected)),
         )
+
+
+def _places(rewritten: RewrittenProgram, controller: Controller) -> tuple[Array, Array]:
+    """``(N,)`` where each target stands in the sequence, and ``(N,)`` on the way to which one.
+
+    A target stands at its own number, but one that an arc passes stands on the way to that arc's end, as far along as
+    it lies on the circle.
+    """
+    plan, ways = rewritten.plan, rewritten.ways
+    place, belongs_to = np.arange(len(plan), dtype=float), np.arange(len(plan))
+    p_CT = tool_poses_meant(plan, controller)[:, :3, 3]
+    for way, arc in ways.arcs.items():
+        if ways.followed[way]:
+            end, away = int(ways.target[way]), p_CT[arc.through] - arc.circle.centre
+            angle = np.arctan2(np.cross(arc.circle.axis, arc.radius) @ away, arc.radius @ away) % (2.0 * np.pi)
+            place[arc.through], belongs_to[arc.through] = end - 1.0 + angle / arc.angle_rad, end
+    return place, belongs_to
 
 
 def _remarks(rewritten: RewrittenProgram, line: Array) -> tuple[Remark, ...]:

@@ -145,6 +145,20 @@ class FinePaths:
         )
 
 
+def stated_magnification(text: str) -> Magnification:
+    """From a word of the command line.
+
+    Raises:
+        InputError: neither a number nor "auto".
+    """
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError:
+        raise _no_factor(text) from None
+
+
 def magnification_of(paths: Toolpaths, wanted: Magnification) -> float:
     """The factor by which errors are drawn: as wanted, or a round one for these paths.
 
@@ -154,10 +168,13 @@ def magnification_of(paths: Toolpaths, wanted: Magnification) -> float:
     if wanted == "auto":
         return nice_magnification(paths)
     if not isinstance(wanted, Real) or not 0 < wanted <= LARGEST_FACTOR:
-        raise InputError(
-            "errors cannot be drawn at this scale", expected="a factor above 0, up to 10000, or auto", found=str(wanted)
-        )
+        raise _no_factor(wanted)
     return float(wanted)
+
+
+def _no_factor(wanted: object) -> InputError:
+    expected = "a factor above 0, up to 10000, or auto"
+    return InputError("errors cannot be drawn at this scale", expected=expected, found=str(wanted))
 
 
 def nice_magnification(paths: Toolpaths) -> float:

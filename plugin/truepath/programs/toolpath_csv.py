@@ -89,7 +89,7 @@ def read_toolpath(path: str | Path, num_joints: int) -> Toolpath:
     Raises:
         InputError: neither joints nor poses, or a fault of the file with line and column.
     """
-    table = read_table(path)
+    table = read_table(path, tell_cut_off=False)  # told among the findings of a correction
     joints = [f"q{i + 1}" for i in range(num_joints)]
     for name in table.header:
         match = re.fullmatch(r"(q\d+)_(rad|deg)", name)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepath import lie
+from truepath.barycentre import barycentres, pose_count
 from truepath.diagnosis import Diagnosis
 from truepath.lie import Array
 from truepath.report.canvas import AFTER, BEFORE, NETWORK, NOMINAL, PALE
@@ -28,7 +29,7 @@ class Plot:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """K poses, outliers left out, in the order of measurement. B is the robot base.
+    """K rows, outliers left out, in the order of measurement. B is the robot base.
 
     Attributes:
         q_rad: ``(K, n)`` commanded joints.
@@ -75,16 +76,19 @@ class Drawn:
 
     @property
     def judged(self) -> tuple[Array, str]:
-        """``(K,)`` the poses by which models are judged, and what they are called: all, where none was kept away."""
-        return (self.unseen, "unseen poses") if self.unseen.any() else (np.ones(len(self.row), bool), "poses")
+        """``(K,)`` the rows by which models are judged, and what they are called: all, where none was kept away."""
+        several = f"{self.noun}s"
+        return (self.unseen, f"unseen {several}") if self.unseen.any() else (np.ones(len(self.row), bool), several)
+
+    @property
+    def noun(self) -> str:
+        """What a row is: a pose, or one of its readings where poses were visited again."""
+        return "pose" if pose_count(self.group) == len(self.group) else "reading"
 
     def error_length(self, stage: str, first: int = 0) -> Array:
         """``(P,)`` lengths of the errors at unseen poses, visits of one pose averaged; from column ``first`` on."""
-        errors, group = self.error_B[stage][self.unseen, first : first + 3], self.group[self.unseen]
-        group = np.unique(group, return_inverse=True)[1]
-        count = np.bincount(group)[:, None]
-        means = np.stack([np.bincount(group, errors[:, k]) for k in range(3)], axis=1) / count
-        return np.linalg.norm(means, axis=1)
+        errors = self.error_B[stage][self.unseen, first : first + 3]
+        return np.linalg.norm(barycentres(errors, self.group[self.unseen]), axis=1)
 
 
 def _errors(diagnosis: Diagnosis, R_BM: Array, kept: Array) -> dict[str, Array]:

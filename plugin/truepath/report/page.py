@@ -10,6 +10,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from truepath.diagnosis import Diagnosis
+from truepath.found_frames import found_frames
 from truepath.look import stylesheet
 from truepath.report import sections, stage_strip
 from truepath.report.distribution import distributions
@@ -17,6 +18,7 @@ from truepath.report.drawn import Drawn, Plot
 from truepath.report.network import network_card
 from truepath.report.residual_plots import over_joints, over_temperature, over_time
 from truepath.report.spectrum import spectra
+from truepath.report.words import sentence
 from truepath.report.workspace import error_vectors
 
 
@@ -32,7 +34,7 @@ def render(diagnosis: Diagnosis) -> str:
         "base-uri 'none'; form-action 'none'"
     )
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["drawing"] = _drawing
+    environment.filters |= {"drawing": _drawing, "sentence": sentence}
     return environment.from_string(_own("page.html.jinja")).render(
         policy=policy,
         css=Markup(stylesheet() + _own("page.css")),
@@ -58,6 +60,7 @@ def render(diagnosis: Diagnosis) -> str:
         not_testable=sections.not_testable(diagnosis),
         outliers=sections.outliers(diagnosis),
         kinematics=sections.kinematics(diagnosis),
+        frames=found_frames(diagnosis.calibration),
         counts=sections.counts(diagnosis),
     )
 

@@ -9,8 +9,10 @@ from urllib.parse import quote
 
 import numpy as np
 
+from truepath.barycentre import pose_count
 from truepath.calibration_parts import Parameter
 from truepath.diagnosis import Diagnosis, Finding, FoundParameter
+from truepath.measurements import Measurements
 from truepath.report.drawn import Drawn, Plot
 from truepath.report.residual_plots import of_finding
 from truepath.report.words import (
@@ -75,7 +77,7 @@ def facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     return [
         ("File", measurements.source),
         ("Robot", f"{calibration.robot.name}, {n} joints"),
-        ("Measured", f"{counted(len(measurements), 'pose')}, {kind}"),
+        ("Measured", f"{_poses(measurements)}, {kind}"),
         ("Written", calibration.created_utc.replace("T", " ").replace("+00:00", " UTC")),
         ("Software", software),
         ("SHA-256 of the data", measurements.sha256),
@@ -88,7 +90,7 @@ def subtitle(diagnosis: Diagnosis) -> list[str]:
     measurements, calibration = diagnosis.measurements, diagnosis.calibration
     return [
         f"robot {calibration.robot.name}",
-        f"{counted(len(measurements), 'pose')} ({'6D' if measurements.has_orientation else '3D'})",
+        f"{_poses(measurements)} ({'6D' if measurements.has_orientation else '3D'})",
         calibration.created_utc[:10],
         f"truepath {calibration.software.get('truepath', '')}".strip(),
         f"SHA-256 {measurements.sha256[:12]}…",
@@ -96,14 +98,21 @@ def subtitle(diagnosis: Diagnosis) -> list[str]:
 
 
 def counts(diagnosis: Diagnosis) -> dict[str, int]:
-    """Numbers of poses."""
+    """Numbers of different poses, however often visited, and of rows that were left out."""
     outlier, unseen = np.asarray(diagnosis.outlier, bool), np.asarray(diagnosis.unseen, bool)
+    groups = diagnosis.measurements.groups()
     return {
-        "poses": len(outlier),
+        "poses": pose_count(groups),
         "outliers": int(outlier.sum()),
-        "unseen": int((unseen & ~outlier).sum()),
-        "seen": int((~unseen & ~outlier).sum()),
+        "unseen": pose_count(groups[unseen & ~outlier]),
+        "seen": pose_count(groups[~unseen & ~outlier]),
     }
+
+
+def _poses(measurements: Measurements) -> str:
+    """``94 poses``, ``94 poses in 100 readings``."""
+    poses, rows = pose_count(measurements.groups()), len(measurements)
+    return counted(poses, "pose") + ("" if poses == rows else f" in {counted(rows, 'reading')}")
 
 
 def findings(diagnosis: Diagnosis, drawn: Drawn) -> list[FindingCard]:

@@ -33,7 +33,7 @@ READABLE_UNITS = {  # SI unit: factor and unit on paper
     "s": (1.0, "s"),
 }
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-LARGEST_EXPONENT = 300  # beyond, a float says nothing but "very"
+MOST_POWERS = 12  # of ten in odds and probabilities: no model is right in so many digits, and nobody needs more
 LARGEST_PLAIN_ODDS = 1e4
 
 
@@ -92,7 +92,9 @@ def with_sign(number: str) -> str:
 
 
 def with_powers(text: str) -> str:
-    """A text in which ``3e-12`` is written ``3 × 10⁻¹²``."""
+    """A text in which ``3e-9`` is written ``3 × 10⁻⁹``, and ``p = 3e-40`` as ``probability`` writes it."""
+    least = 10.0**-MOST_POWERS
+    text = re.sub(r"\bp = (\d\S*e-\d+)", lambda m: probability(float(m[1])) if float(m[1]) < least else m[0], text)
     return re.sub(r"(?<=\d)e(-\d+)", lambda m: f" \N{MULTIPLICATION SIGN} 10{superscript(int(m[1]))}", text)
 
 
@@ -111,15 +113,18 @@ def superscript(number: int) -> str:
 
 
 def probability(p_value: float) -> str:
-    """``p = 0.02``, ``p = 3 × 10⁻¹²``, ``p < 10⁻³⁰⁰``."""
-    if p_value <= 10.0**-LARGEST_EXPONENT:
-        return f"p < 10{superscript(-LARGEST_EXPONENT)}"
+    """``p = 0.02``, ``p = 3 × 10⁻⁹``, ``p < 10⁻¹²``."""
+    if p_value < 10.0**-MOST_POWERS:
+        return f"p < 10{superscript(-MOST_POWERS)}"
     return "p = " + (significant(p_value, 2) if p_value >= 1e-3 else power_of_ten(p_value))
 
 
 def odds(log_odds: float) -> str:
-    """A natural logarithm of odds as ``150 to 1``, ``10³⁸ to 1``, or ``1 to 20`` where they are against it."""
+    """A natural logarithm of odds: ``150 to 1``, ``10⁹ to 1``, ``more than 10¹² to 1``; ``1 to 20`` against it."""
     size = abs(log_odds)
+    if size > MOST_POWERS * math.log(10.0):
+        most = f"10{superscript(MOST_POWERS)}"
+        return f"more than {most} to 1" if log_odds > 0 else f"less than 1 to {most}"
     if size < math.log(LARGEST_PLAIN_ODDS):
         number = significant(math.exp(size), 2)
     else:

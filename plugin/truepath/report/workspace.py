@@ -89,7 +89,7 @@ def _plot(
         color=INK,
         bbox={"facecolor": "#ffffff", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
     )
-    several = counted(len(shown), "pose") + ("" if len(shown) == len(drawn.row) else f" of {len(drawn.row)}")
+    several = counted(len(shown), drawn.noun) + ("" if len(shown) == len(drawn.row) else f" of {len(drawn.row)}")
     caption = f"errors drawn {factor:g} times larger; {several}"
     return Plot(write_svg(figure, f"Error vectors, {title}: {caption}", identity), caption)
 

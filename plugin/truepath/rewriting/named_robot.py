@@ -1,9 +1,15 @@
-"""Which robot a program says it is for, in the comments at its head."""
+"""Which robot a program says it is for, in the comments at its head; and when it looks like that of another."""
 
 from __future__ import annotations
 
 import re
 
+import numpy as np
+
+from truepath.lie import Array
+
+ANOTHER_ROBOT = "is it a program for another robot?"
+FEW = 4  # targets, of which one or two may be wrong by themselves
 HEAD_LINES = 60
 COMMENTED = re.compile(r"#(.*)$", re.MULTILINE)
 STATED = re.compile(
@@ -19,3 +25,8 @@ def robot_named_in(text: str) -> str | None:
         if match:
             return match[1]
     return None
+
+
+def is_most_of(wrong: Array) -> bool:
+    """Whether so many targets ``(N,)`` are wrong that it is hardly each of them by itself."""
+    return len(wrong) >= FEW and bool(2 * np.count_nonzero(wrong) > len(wrong))

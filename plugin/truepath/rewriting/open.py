@@ -15,6 +15,7 @@ from truepath.programs.program import Program
 from truepath.programs.toolpath_csv import read_toolpath
 from truepath.programs.toolpath_program import ToolpathProgram
 from truepath.region import Region
+from truepath.rewriting.note import refuse_if_noted
 from truepath.robot import NominalRobot
 
 SCRIPTS = (".script", ".urscript", ".urs")
@@ -40,7 +41,8 @@ def open_program(
         tool: for a script, see ``urscript.script.parse_script``.
 
     Raises:
-        InputError: no such file, another kind of file, or a fault in it; with line and column.
+        InputError: no such file, another kind of file, or a fault in it; with line and column. A toolpath that was
+            corrected, by the note beside it.
         CorrectionError: a path of poses that the robot cannot follow.
     """
     path = Path(path)
@@ -59,6 +61,7 @@ def open_program(
             found=ending or "no ending",
         )
     toolpath = read_toolpath(path, robot.num_joints)
+    refuse_if_noted(path, toolpath.table.raw)
     q: Array
     if toolpath.q_rad is not None:
         q = toolpath.q_rad
@@ -67,3 +70,21 @@ def open_program(
         start = None if start_rad is None else np.array(start_rad)
         q = joints_along_path(robot, toolpath.X_BF, prefer, toolpath.table.lines, str(path), start)
     return ToolpathProgram(toolpath, q, controller.X_BC, controller.X_F0)
+
+
+def require_same_format(program: str | Path, output: str | Path) -> None:
+    """Refuses to write a program into a file whose name is that of another format.
+
+    Raises:
+        InputError: it is; names that belong to no format pass.
+    """
+    ending, wanted = (Path(each).suffix.lower() for each in (output, program))
+    formats = next((each for each in (SCRIPTS, (TOOLPATH,)) if wanted in each), None)
+    if formats is None or ending in formats or ending not in (*SCRIPTS, TOOLPATH):
+        return
+    raise InputError(
+        "the output is named as a program of another format",
+        file=output,
+        expected=f"a name ending in {', '.join(formats)}, like {Path(program).name}",
+        found=ending,
+    )

@@ -15,8 +15,10 @@ from truepath.errors import CorrectionError
 from truepath.guards import Finding
 from truepath.lie import Array
 from truepath.model import nominal_flange_poses
+from truepath.postures import follow_targets
 from truepath.programs.motions import Motions
 from truepath.rewriting.known_postures import known_postures
+from truepath.rewriting.named_robot import ANOTHER_ROBOT, is_most_of
 from truepath.robot import NominalRobot
 
 OF_THE_WHOLE = ("tools", "possible")  # of a program, not of each of its targets
@@ -98,12 +100,13 @@ def plan_targets(
     if lost.any():
         k = int(np.argmax(lost))
         x, y, z = 1e3 * motions.X_CT[k, :3, 3]
+        hint = f"; so are most targets: {ANOTHER_ROBOT}" if is_most_of(_nowhere_near(robot, X_BF[is_pose])) else ""
         raise CorrectionError(
             "the target is out of reach, or beyond a joint limit from where the robot comes",
             file=file,
             line=int(motions.line[k]),
             expected=f"a pose that {robot.name} can take from there, in its base frame",
-            found=f"the tool at ({x:.1f}, {y:.1f}, {z:.1f}) mm",
+            found=f"the tool at ({x:.1f}, {y:.1f}, {z:.1f}) mm{hint}",
         )
     doubtful = followed.start_unknown | followed.ambiguous | ~followed.certain
     kept = np.flatnonzero(~doubtful)
@@ -124,3 +127,10 @@ def select(motions: Motions, kept: Array) -> Motions:
     each = {part.name: getattr(motions, part.name) for part in fields(motions) if part.name not in OF_THE_WHOLE}
     parts = {name: values[kept] for name, values in each.items() if values is not None}
     return replace(motions, **{**parts, "previous": place[parts["previous"]], "origin": place[parts["origin"]]})
+
+
+def _nowhere_near(robot: NominalRobot, X_BF: Array) -> Array:
+    """``(N,)`` True where the robot reaches a flange pose ``(N, 4, 4)`` in no posture, wherever it comes from."""
+    anywhere = np.clip(np.zeros(robot.num_joints), robot.lower_rad, robot.upper_rad)
+    untold = np.full((len(X_BF), robot.num_joints), np.nan)
+    return ~follow_targets(robot, X_BF, untold, untold, np.full(len(X_BF), -1), anywhere).reached

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from truepath.calibration import Calibration
 from truepath.controller import Controller, controller_of
 from truepath.correct import Correction, correct
 from truepath.errors import CorrectionError
-from truepath.files import write_atomically
 from truepath.guards import Finding, calibration_findings, condense
 from truepath.iso9283 import ErrorStatistics
 from truepath.lie import Array
@@ -23,8 +22,10 @@ from truepath.programs.program import Program, Unresolved
 from truepath.rewriting.doubtful import doubtful_findings
 from truepath.rewriting.express import Expressed, express, tool_errors_mm
 from truepath.rewriting.named_robot import robot_named_in
-from truepath.rewriting.open import open_program
+from truepath.rewriting.note import write_with_note
+from truepath.rewriting.open import open_program, require_same_format
 from truepath.rewriting.options import RewriteOptions
+from truepath.rewriting.payload import payload_findings
 from truepath.rewriting.plan import Plan, plan_targets
 from truepath.rewriting.said import program_findings
 from truepath.rewriting.vias import Vias, choose_vias
@@ -48,6 +49,8 @@ class RewrittenProgram:
         unresolved: moves that stay as they are.
         findings: warnings of the guards.
         cell: in which collisions were looked for; None: nowhere.
+        note: what the note beside the corrected program says (``rewriting.note``); None where it bears a stamp, or
+            stays as it is.
     """
 
     file: str
@@ -62,6 +65,7 @@ class RewrittenProgram:
     unresolved: tuple[Unresolved, ...]
     findings: tuple[Finding, ...] = field(default=())
     cell: str | None = None
+    note: Stamp | None = None
 
     def __repr__(self) -> str:
         total, cell = len(self.plan) + len(self.unresolved), "no cell" if self.cell is None else self.cell
@@ -71,15 +75,17 @@ class RewrittenProgram:
         )
 
     def write(self, path: str | Path) -> None:
-        """Writes the corrected program, as a whole or not at all.
+        """Writes the corrected program, as a whole or not at all, and the note beside it if its format needs one.
 
         Raises:
-            InputError: it would be written over the program that was read; a place that cannot be written to.
+            InputError: it would be written over the program that was read; a name of another format; a place that
+                cannot be written to.
         """
         from truepath.pipeline import keep
 
         keep(Path(path), Path(self.file))
-        write_atomically(path, self.content)
+        require_same_format(self.file, path)
+        write_with_note(path, self.content, self.note)
 
     def summary(self) -> dict[str, Any]:
         """What a machine wants to know, as plain JSON types."""
@@ -185,6 +191,7 @@ def rewrite(
         *calibration_findings(calibration, robot_named_in(program.text), today, options.max_age_days),
         *findings,
         *program_findings(program, options),
+        *payload_findings(program, calibration, controller),
         *_too_far_off(plan, ways, vias, tolerance_mm, program),
         *doubtful_findings(
             plan, motions.possible, X_end, model, controller, tolerance_mm, options.max_correction_mm, file
@@ -201,9 +208,10 @@ def rewrite(
             tool_errors_mm(model.flange_poses(q), goal, controller.X_F0, plan.motions.X_0T)
             for q in (plan.q_today_rad, correction.q_rad)
         )
+    content, note = _written(program, expressed, calibration, today)
     return RewrittenProgram(
         file=file,
-        content=_written(program, expressed, calibration, today),
+        content=content,
         changed=len(expressed.targets.index),
         plan=plan,
         correction=correction,
@@ -214,6 +222,7 @@ def rewrite(
         unresolved=tuple(sorted([*program.unresolved, *_without_posture(program, plan)], key=lambda each: each.line)),
         findings=tuple(findings),
         cell=None if options.looks_in is None else str(options.looks_in),
+        note=note,
     )
 
 
@@ -267,14 +276,18 @@ def _refuse(findings: list[Finding], file: str) -> None:
         )
 
 
-def _written(program: Program, expressed: Expressed, calibration: Calibration, today: date) -> bytes:
+def _written(
+    program: Program, expressed: Expressed, calibration: Calibration, today: date
+) -> tuple[bytes, Stamp | None]:
+    """The corrected program, and what the note beside it says if it cannot bear a stamp."""
     if not len(expressed.targets.index) and not expressed.vias:
-        return program.raw  # as it was, to the byte
-    if program.comment is None:
-        return program.rewritten(expressed.targets, expressed.vias, "")
+        return program.raw, None  # as it was, to the byte
     stamp = Stamp.of(program.raw, calibration.to_json().encode(), today)
+    if program.comment is None:
+        content = program.rewritten(expressed.targets, expressed.vias, "")
+        return content, replace(stamp, body_sha256=hashlib.sha256(content).hexdigest())
     content = program.rewritten(expressed.targets, expressed.vias, stamp.line(program.comment))
-    return sealed(content, stamp, program.comment)
+    return sealed(content, stamp, program.comment), None
 
 
 def _statistics(values: Array) -> dict[str, float] | None:

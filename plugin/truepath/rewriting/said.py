@@ -9,10 +9,11 @@ from truepath.guards import Finding
 from truepath.programs.program import Program
 from truepath.programs.toolpath_program import ToolpathProgram
 from truepath.rewriting.options import RewriteOptions
+from truepath.tables import CUT_OFF
 
 
 def program_findings(program: Program, options: RewriteOptions) -> list[Finding]:
-    """Warnings about moves that are never made, poses without a tool, and a posture that was chosen.
+    """Warnings about moves that are never made, poses without a tool, a posture that was chosen, and a file cut off.
 
     Raises:
         InputError: poses are asked for, but the program has no place for them.
@@ -31,11 +32,13 @@ def program_findings(program: Program, options: RewriteOptions) -> list[Finding]
 
 
 def _of_a_toolpath(program: ToolpathProgram, options: RewriteOptions) -> list[Finding]:
+    table = program.toolpath.table
+    cut_off = [Finding("warning", "cut-off", int(table.lines[-1]), CUT_OFF)] if table.ends_within_a_line else []
     if options.express != "poses":
-        return []
+        return cut_off
     if program.toolpath.X_BF is None:
         raise InputError("the toolpath has no columns for poses", file=program.file, expected="--as joints, or no --as")
     if options.start_rad is not None:
-        return []
+        return cut_off
     message = "the path is taken in the posture nearest to the measured ones; --start-deg states another"
-    return [Finding("warning", "posture", int(program.toolpath.table.lines[0]), message)]
+    return [*cut_off, Finding("warning", "posture", int(table.lines[0]), message)]

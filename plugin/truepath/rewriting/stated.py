@@ -7,7 +7,7 @@ from typing import Literal
 
 from truepath.calibration import Calibration
 from truepath.errors import InputError
-from truepath.plants import BUILT_IN
+from truepath.plants import BUILT_IN, resolve
 from truepath.rewriting.options import RewriteOptions
 
 FORMS: dict[str, Literal["joints", "poses"]] = {"joints": "joints", "poses": "poses"}
@@ -40,6 +40,8 @@ def stated_options(
         raise InputError("the path tolerance is no length", expected="0 or more, in mm", found=str(path_tolerance_mm))
     if not max_correction_mm >= 0:
         raise InputError("the largest correction is no length", expected="0 mm or more", found=str(max_correction_mm))
+    if cell not in (None, NOWHERE):
+        resolve(cell, "cell")
     joints = len(calibration.robot.joint_names)
     start = None if start_deg is None else _numbers(start_deg, joints, "--start-deg", f"{joints} angles in degrees")
     tool = None if tcp is None else _numbers(tcp, 6, "--tcp", "x,y,z in mm, rx,ry,rz in rad")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ from truepath.guards import Finding
 from truepath.lie import Array
 from truepath.programs.motions import Kind
 from truepath.rates import joint_motions, rate_findings, servo_motions, tool_motions
+from truepath.rewriting.named_robot import ANOTHER_ROBOT, is_most_of
 from truepath.rewriting.plan import Plan
 from truepath.rewriting.ways import Ways
 
@@ -97,7 +98,10 @@ def _room(
         drawn = Cell(cell, nominal_model(model.robot, model.X_MB_nominal, model.X_FE_nominal))
         places = compare(today, then, drawn.clearances(along.q_today_rad))
     driven = collide_all_along(today, then, along.line)
-    return [*clearance_findings(places, along.line, driven=driven), *driven_findings(driven, along.line)]
+    by_itself = driven_findings(driven, along.line)
+    if is_most_of(np.isin(plan.motions.line, along.line[[place.index for place in driven]])):
+        by_itself = [replace(each, message=f"{each.message}; {ANOTHER_ROBOT}") for each in by_itself]
+    return [*clearance_findings(places, along.line, driven=driven), *by_itself]
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,10 +119,13 @@ def to_csv(measurements: Measurements) -> str:
 
 def truth_json(real: RealRobot, campaign: Campaign, causes: Mapping[str, HiddenCause] | None = None) -> str:
     """What was hidden, for whoever wants to check a calibration or a diagnosis afterwards."""
+    stated = asdict(campaign)
+    stated["poses_seed"] = stated.pop("seed")  # the robot has one, too
     content: dict[str, Any] = {
         "schema": "truepath.truth/1",
         "cell": str(real.spec),
-        "campaign": asdict(campaign),
+        "robot_seed": real.seed,
+        "campaign": stated,
         "hidden_frame_errors": real.hidden_errors,
     }
     if causes:

@@ -131,6 +131,20 @@ def test_an_arc_along_which_the_tool_turns_is_not(mode, word):
     assert word in script.unresolved[0].why
 
 
+@pytest.mark.parametrize(
+    ("move", "why"),
+    [
+        ("movej([0,-1.6,1.7,-1.6,-1.5])", "a list of 5 numbers, and six joints are expected"),
+        ("q = [1,2,3,4,5,6,7]\nservoj(q)", "a list of 7 numbers, and six joints are expected"),
+        ("x = p[-0.4,0.1,0.2,0,3.1,0]\nservoj(x)", "a pose, and servoj takes six joints"),
+        ('movej([0,-1.6,1.7,-1.6,-1.5,"0"])', "neither six joints nor a pose"),
+    ],
+)
+def test_a_target_that_no_robot_takes_is_told_as_what_it_is(move, why):
+    (unresolved,) = read(move.encode()).unresolved
+    assert unresolved.why.endswith(why)
+
+
 DRIFT = """def p():
   movej([0,-1.6,1.7,-1.6,-1.5,0])
   {command}

@@ -10,7 +10,7 @@ from truepath.programs.urscript.slots import SlotOf, signed_slot, slots_of_targe
 from truepath.programs.urscript.source import Line
 from truepath.programs.urscript.syntax import Node, Shape
 from truepath.programs.urscript.tree import Statement
-from truepath.programs.urscript.values import JointsOf, Pose, Unknown, Value, is_joints
+from truepath.programs.urscript.values import JointsOf, Pose, Unknown, Value, is_joints, is_number
 from truepath.programs.urscript.written import Key, Written
 
 # Line and column of the call, and of the literal elsewhere that it takes as its target, if it takes one.
@@ -177,7 +177,15 @@ def problem_of(name: str, targets: tuple[Value, ...], tool: Value) -> str | None
             return value.tool.why
         fits = isinstance(value, JointsOf) or is_joints(value) or (isinstance(value, Pose) and name != "servoj")
         if not fits:
-            return "its target is neither six joints nor a pose"
+            return _no_target(name, value)
     if isinstance(tool, Unknown) and any(isinstance(value, (Pose, JointsOf)) for value in targets):
         return f"the tool is not known: {tool.why}"
     return None
+
+
+def _no_target(name: str, value: Value) -> str:
+    if isinstance(value, Pose):
+        return f"its target is a pose, and {name} takes six joints"
+    if isinstance(value, tuple) and all(map(is_number, value)):
+        return f"its target is a list of {len(value)} numbers, and six joints are expected"
+    return "its target is neither six joints nor a pose"

@@ -89,7 +89,7 @@ def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> 
             controller's tool flange; none if not stated.
 
     Raises:
-        InputError: this is no URScript; with line and column.
+        InputError: this is no URScript, with line and column; or there is nothing in it.
     """
     if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise InputError("the program is UTF-16", file=file, expected="UTF-8")
@@ -101,6 +101,8 @@ def parse_script(raw: bytes, file: str, tool: Sequence[float] | None = None) -> 
     with collector_at_rest():
         try:
             program = parse(text, file)
+            if not program:
+                raise InputError("the program is empty", file=file, expected="a statement at least", found="none")
             moves = Follower(program, file, start).moves
         except RecursionError:
             raise InputError("calls, blocks and brackets are too deep to be followed", file=file) from None
