@@ -73,7 +73,7 @@ class TestDiagnosis:
     @pytest.mark.parametrize(
         ("design", "seed"),
         [
-            ("small_workspace", 2),
+            pytest.param("small_workspace", 2, marks=pytest.mark.slow),
             ("sweep", 0),
             pytest.param("sweep", 1, marks=pytest.mark.slow),
             pytest.param("sweep", 2, marks=pytest.mark.slow),

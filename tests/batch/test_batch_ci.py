@@ -106,6 +106,7 @@ def test_it_keeps_report_programs_and_previews(runner, tmp_path):
     assert runner("Correct all programs", ROBOT="ur10") == {"Correct all programs": 2}
 
 
+@pytest.mark.slow
 def test_programs_outside_the_calibrated_region_turn_it_red(runner, tmp_path, capfd):
     """There nobody knows what to expect, however exactly the joints are solved."""
     (tmp_path / "programs").mkdir()

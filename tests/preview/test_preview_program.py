@@ -138,7 +138,7 @@ def spiral(count: int) -> str:
     return head + "\n".join(moves) + "\nend\n"
 
 
-@pytest.mark.parametrize("count", [1_000, 10_000])
+@pytest.mark.parametrize("count", [pytest.param(1_000, marks=pytest.mark.slow), 10_000])
 def test_a_long_program_is_small_and_quick(tmp_path, browser, calibration, count):
     file, page_file = tmp_path / "long.script", tmp_path / "p.html"
     file.write_text(spiral(count))
