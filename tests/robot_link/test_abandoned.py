@@ -40,7 +40,7 @@ def test_the_watchdog_of_the_controller_stops_the_move(controller, link):
     for pid in (*children, parent.pid):
         os.kill(int(pid), signal.SIGKILL)
     parent.wait()
-    assert within(2.0, lambda: speed(controller) == 0.0)
+    assert within(2.0, lambda: controller.command({"do": "state"})["program"] is None)
+    assert within(1.0, lambda: speed(controller) == 0.0)
     state = controller.command({"do": "state"})
-    assert state["program"] is None
     assert abs(state["commanded_q_rad"][0] - goal[0]) > 0.1

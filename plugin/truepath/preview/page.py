@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
@@ -100,7 +101,7 @@ def render(text: PageText, shown: ShownPath, outside: Array, recorded: RecordedS
         not_known=NOT_KNOWN,
         drawn=larger or "errors drawn in true size",
         gradient=", ".join(colours.ERROR_SCALE),
-        ticks=[f"{share * text.scale_mm:.3g}" for share in (0.0, 0.25, 0.5, 0.75, 1.0)],
+        ticks=_ticks(text.scale_mm),
         colours=colours,
         scene=scene,
         remarks=text.remarks[:MOST_REMARKS],
@@ -171,3 +172,9 @@ def _as_script(source: str) -> str:
 
 def _sha256(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+def _ticks(scale_mm: float) -> list[str]:
+    """Numbers below the colour bar, all with the same digits."""
+    digits = max(0, 2 - math.floor(math.log10(0.25 * scale_mm))) if scale_mm > 0 else 0
+    return ["0", *(f"{share * scale_mm:.{digits}f}" for share in (0.25, 0.5, 0.75, 1.0))]
