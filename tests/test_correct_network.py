@@ -78,6 +78,16 @@ def test_the_correction_stays_continuous_while_the_networks_fade(corrected, leav
     assert np.abs(np.diff(change, axis=0)).max() < np.abs(change).max() / 7
 
 
+def test_half_the_step_changes_the_correction_by_half_as_much(model, corrected, leaving):
+    """So there is no jump anywhere: one would stay as large, however close the waypoints are."""
+    closer = HOME + np.linspace(0, 1.2, 399)[:, None] * OUTWARDS
+    fine, coarse = (
+        np.abs(np.diff(q - programmed, axis=0)).max()
+        for q, programmed in ((correct(model, closer).q_rad, closer), (corrected.q_rad, leaving))
+    )
+    assert fine < 0.55 * coarse
+
+
 def test_where_the_networks_are_silent_the_correction_is_the_one_without_them(corrected, model, leaving):
     without = correct(replace(model, residual=None), leaving)
     silent = corrected.networks.silent
